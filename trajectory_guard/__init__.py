@@ -1,0 +1,1 @@
+"""Certified collision freedom for the motion a controller really plays."""

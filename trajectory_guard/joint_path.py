@@ -1,0 +1,283 @@
+"""What the controller plays: a trajectory message as one curve in joint space."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from trajectory_guard.errors import Reason, RequestError, TrajectoryError
+from trajectory_guard.hermite import hermite, Knots
+from trajectory_guard.joint_limits import limit_excess
+from trajectory_guard.mimic import follow, followers
+from trajectory_guard.robot import Joint, JointType
+from trajectory_guard.start_state import with_start
+from trajectory_guard.trajectory import JointState, Trajectory
+
+# Splines of ros2_control's joint_trajectory_controller, Jazzy 4.x.
+INTERPOLATION = 'joint_trajectory_controller/jazzy'
+
+# Below this the controller itself takes the last velocity for zero [rad/s or m/s].
+_REST_VELOCITY = float(np.finfo(np.float32).eps)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointPath:
+    """
+    The motion of all movable joints of a robot, S polynomials in time.
+
+    Segment i runs over [knots_ns[i], knots_ns[i + 1]]; there joint j is at
+    sum_k coefficients[i, j, k] s^k, s = (t - knots_ns[i]) / (knots_ns[i + 1] - knots_ns[i]).
+
+    :param joint_names: n movable joints in the robot's order, mimic joints included.
+    :param in_path: (n,) bool, whether the message commands the joint, or the one it mimics.
+    :param knots_ns: (S + 1,) int64, from unknown_until_ns to the last point [ns]; a pose without
+        motion is one constant segment and may have equal knots.
+    :param coefficients: (S, n, 6) [rad or m].
+    :param coefficient_error: (S, n) bound on sum_k |coefficient - exact coefficient|; it holds
+        for the value at every s as well [rad or m].
+    :param unknown_until_ns: before this time no start state tells where the arm is [ns].
+    :param limits_checked: whether the joint limits were enforced.
+    """
+
+    joint_names: tuple[str, ...]
+    in_path: np.ndarray
+    knots_ns: np.ndarray
+    coefficients: np.ndarray
+    coefficient_error: np.ndarray
+    unknown_until_ns: int
+    limits_checked: bool
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for array in (self.in_path, self.knots_ns, self.coefficients, self.coefficient_error):
+            array.setflags(write=False)
+
+    @property
+    def duration_ns(self) -> int:
+        """Time of the last point [ns]."""
+        return int(self.knots_ns[-1])
+
+    def position(self, time_ns: int) -> np.ndarray:
+        """
+        Evaluate the path, to rounding.
+
+        :param time_ns: from knots_ns[0] to the end [ns].
+        :returns: (n,) [rad or m].
+        :raises RequestError: outside that range.
+        """
+        knots = self.knots_ns
+        if not knots[0] <= time_ns <= knots[-1]:
+            raise RequestError(
+                Reason.INVALID_PARAMETER,
+                f'the path is known from {knots[0]} to {knots[-1]} ns, not at {time_ns} ns',
+            )
+        i = min(int(np.searchsorted(knots, time_ns, side='right')), len(knots) - 1) - 1
+        h = int(knots[i + 1]) - int(knots[i])
+        s = (int(time_ns) - int(knots[i])) / h if h else 0.0
+        q: np.ndarray = self.coefficients[i, :, 5].copy()
+        for k in range(4, -1, -1):
+            q = q * s + self.coefficients[i, :, k]
+        return q
+
+
+def joint_path(
+    robot_joints: Sequence[Joint],
+    trajectory: Trajectory,
+    start: JointState | None = None,
+    *,
+    allowed_start_tolerance: float = 0.01,
+    joint_limit_tolerance: float = 1e-6,
+    check_joint_limits: bool = True,
+    allow_nonzero_end_velocity: bool = False,
+) -> JointPath:
+    """
+    Return the curve the controller plays for a trajectory.
+
+    Joints are matched by name. Those the message lacks hold their start position, mimic joints
+    follow. A first point later than 0 is approached from the start state, with its velocities if
+    it has them, else from rest, and without acceleration; continuous joints turn the short way.
+    A first point at 0 must agree with the start state. A start state that gives none of the
+    commanded joints says nothing about them, and one that gives only some is refused.
+
+    :param robot_joints: joints of the robot; the path has the movable ones, in this order.
+    :param trajectory: the message.
+    :param start: where the robot is at time 0; names the robot does not have are ignored.
+    :param allowed_start_tolerance: how far the start state may be off [rad or m].
+    :param joint_limit_tolerance: how far the curve may leave the position limits [rad or m].
+    :param check_joint_limits: False leaves them unchecked, and the path says so.
+    :param allow_nonzero_end_velocity: accept a last point that does not rest.
+    :raises TrajectoryError: if the controller would refuse the message, if it does not say where
+        every joint is, if the curve leaves a joint limit, or if it is too large for doubles.
+    :raises RequestError: for a tolerance that is negative or not finite.
+    :raises RobotError: for a mimic joint that follows nothing.
+    """
+    for what, value in (
+        ('allowed_start_tolerance', allowed_start_tolerance),
+        ('joint_limit_tolerance', joint_limit_tolerance),
+    ):
+        if not (math.isfinite(value) and value >= 0.0):
+            raise RequestError(
+                Reason.INVALID_PARAMETER, f'{what} must be finite and not negative, got {value!r}'
+            )
+    _check_names(robot_joints, trajectory.joint_names)
+    if not allow_nonzero_end_velocity:
+        _check_end_velocity(trajectory)
+    joints = [joint for joint in robot_joints if joint.type is not JointType.FIXED]
+    column = {name: i for i, name in enumerate(trajectory.joint_names)}
+    commanded = [j for j, joint in enumerate(joints) if joint.name in column]
+    mimics = followers(joints)
+    knots = with_start(
+        _knots(trajectory, [column[joints[j].name] for j in commanded]),
+        [joints[j] for j in commanded],
+        start,
+        allowed_start_tolerance,
+        {joints[leader].name for _, leader in mimics},
+    )
+    with np.errstate(all='ignore'):
+        curve, curve_error = hermite(knots if len(knots.times_ns) > 1 else _pose(knots))
+        coefficients = np.zeros((len(curve), len(joints), 6))
+        error = np.zeros((len(curve), len(joints)))
+        coefficients[:, commanded] = curve
+        error[:, commanded] = curve_error
+        coefficients[:, :, 0] += _held_positions(joints, column, start)
+        in_path = np.zeros(len(joints), dtype=np.bool_)
+        in_path[commanded] = True
+        for j, leader in mimics:
+            follow(coefficients, error, joints[j], j, leader)
+            in_path[j] = in_path[leader]
+        path = JointPath(
+            joint_names=tuple(joint.name for joint in joints),
+            in_path=in_path,
+            knots_ns=knots.times_ns if len(knots.times_ns) > 1 else np.repeat(knots.times_ns, 2),
+            coefficients=coefficients,
+            coefficient_error=error,
+            unknown_until_ns=int(knots.times_ns[0]),
+            limits_checked=check_joint_limits,
+        )
+        first_end = len(trajectory.times_ns) - len(curve)
+        _check_size(path, first_end)
+        if check_joint_limits:
+            _check_limits(path, joints, joint_limit_tolerance, first_end)
+    return path
+
+
+def _check_names(robot_joints: Sequence[Joint], names: Sequence[str]) -> None:
+    by_name = {joint.name: joint for joint in robot_joints}
+    for name in names:
+        joint = by_name.get(name)
+        if joint is None:
+            free = [j.name for j in robot_joints if j.type is not JointType.FIXED and not j.mimic]
+            raise TrajectoryError(
+                Reason.UNKNOWN_JOINT,
+                f'the robot has no joint {name!r}; it has ' + ', '.join(map(repr, free)),
+            )
+        if joint.type is JointType.FIXED:
+            raise TrajectoryError(Reason.FIXED_JOINT, f'joint {name!r} is fixed')
+        if joint.mimic is not None:
+            raise TrajectoryError(
+                Reason.MIMIC_JOINT,
+                f'joint {name!r} mimics {joint.mimic.joint!r} and cannot be commanded',
+            )
+
+
+def _check_end_velocity(trajectory: Trajectory) -> None:
+    if not trajectory.has_velocities[-1]:
+        return
+    moving = np.flatnonzero(np.abs(trajectory.velocities[-1]) > _REST_VELOCITY)
+    if moving.size:
+        j = moving[0]
+        raise TrajectoryError(
+            Reason.NONZERO_END_VELOCITY,
+            f'the last point moves joint {trajectory.joint_names[j]!r} '
+            f'at {trajectory.velocities[-1, j]:.9g}',
+        )
+
+
+def _knots(trajectory: Trajectory, columns: Sequence[int]) -> Knots:
+    return Knots(
+        times_ns=trajectory.times_ns,
+        positions=trajectory.positions[:, columns],
+        velocities=trajectory.velocities[:, columns],
+        has_velocities=trajectory.has_velocities,
+        accelerations=trajectory.accelerations[:, columns],
+        has_accelerations=trajectory.has_accelerations,
+        start_error=np.zeros(len(columns)),
+    )
+
+
+def _pose(knots: Knots) -> Knots:
+    """Return a single knot twice, at rest."""
+    off = np.zeros(2, dtype=np.bool_)
+    return Knots(
+        times_ns=np.repeat(knots.times_ns, 2),
+        positions=np.repeat(knots.positions, 2, axis=0),
+        velocities=np.zeros((2, knots.positions.shape[1])),
+        has_velocities=off,
+        accelerations=np.zeros((2, knots.positions.shape[1])),
+        has_accelerations=off,
+        start_error=knots.start_error,
+    )
+
+
+def _held_positions(
+    joints: Sequence[Joint], commanded: Collection[str], start: JointState | None
+) -> np.ndarray:
+    """Return (n,) start positions of the joints that neither the message nor a mimic moves."""
+    held = np.zeros(len(joints))
+    known = {} if start is None else dict(zip(start.joint_names, start.positions, strict=True))
+    unknown = []
+    for j, joint in enumerate(joints):
+        if joint.mimic is None and joint.name not in commanded:
+            if joint.name in known:
+                held[j] = known[joint.name]
+            else:
+                unknown.append(repr(joint.name))
+    if unknown:
+        raise TrajectoryError(
+            Reason.JOINT_POSITION_UNKNOWN,
+            'neither the trajectory nor the start state gives ' + ', '.join(unknown),
+        )
+    return held
+
+
+def _check_size(path: JointPath, first_end: int) -> None:
+    finite = np.isfinite(path.coefficients), np.isfinite(path.coefficient_error)
+    if not (finite[0].all() and finite[1].all()):
+        i, j = np.argwhere(~(finite[0].all(axis=-1) & finite[1]))[0]
+        raise TrajectoryError(
+            Reason.TOO_LARGE,
+            f'the motion of joint {path.joint_names[j]!r} to point {first_end + i} is too large '
+            'for double precision',
+        )
+
+
+def _check_limits(
+    path: JointPath, joints: Sequence[Joint], tolerance: float, first_end: int
+) -> None:
+    limited = [
+        j
+        for j, joint in enumerate(joints)
+        if path.in_path[j] and joint.type is not JointType.CONTINUOUS
+    ]
+    excess = limit_excess(
+        path.coefficients[:, limited],
+        path.coefficient_error[:, limited],
+        np.array([joints[j].lower for j in limited]),
+        np.array([joints[j].upper for j in limited]),
+        tolerance,
+    )
+    if excess is None:
+        return
+    begin, end = path.knots_ns[excess.segment : excess.segment + 2]
+    time = (begin + excess.s * (end - begin)) / 1e9
+    upper = excess.value > excess.limit
+    raise TrajectoryError(
+        Reason.JOINT_LIMIT,
+        f'joint {joints[limited[excess.joint]].name!r} reaches {excess.value:.9g} at '
+        f'{time:.9g} s, on the way to point {first_end + excess.segment}; its '
+        f'{"upper" if upper else "lower"} limit is {excess.limit:.9g}, '
+        f'joint_limit_tolerance {tolerance:g}',
+    )

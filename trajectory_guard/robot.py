@@ -1,0 +1,184 @@
+"""A robot as data: a tree of joints, and convex bodies that contain the links."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+import hashlib
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from trajectory_guard.body import ConvexBody, read_only
+from trajectory_guard.errors import Reason, RobotError
+
+
+class JointType(Enum):
+    """How the child link may move against its parent."""
+
+    REVOLUTE = 'revolute'
+    CONTINUOUS = 'continuous'
+    PRISMATIC = 'prismatic'
+    FIXED = 'fixed'
+
+
+class Mimic(NamedTuple):
+    """
+    A joint that follows another: position = multiplier * position(joint) + offset.
+
+    :param joint: the followed joint, movable and itself no mimic.
+    :param multiplier: factor, dimensionless or [rad/m], [m/rad].
+    :param offset: [rad] or [m].
+    """
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joint:
+    """
+    A joint of the tree: T_parent_child(q) = T_parent_joint * motion(q).
+
+    The motion turns about the axis (q in rad) or slides along it (q in m); both through the
+    joint's origin.
+
+    :param name: unique in the robot.
+    :param type: kind of the motion.
+    :param parent: parent link.
+    :param child: child link, whose frame is the joint frame at q = 0.
+    :param T_parent_joint: pose of the joint frame in the parent link, (4, 4), rigid; entries of
+        the rotation within 16 * 2^-53 of the exact ones [m].
+    :param axis: unit axis in the joint frame, (3,), each entry within 8 * 2^-53 of the exact one.
+    :param lower: lower position limit [rad or m]; -inf for a continuous joint.
+    :param upper: upper position limit [rad or m]; inf for a continuous joint.
+    :param mimic: set if the joint follows another one.
+    """
+
+    name: str
+    type: JointType
+    parent: str
+    child: str
+    T_parent_joint: np.ndarray
+    axis: np.ndarray
+    lower: float
+    upper: float
+    mimic: Mimic | None = None
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        object.__setattr__(self, 'T_parent_joint', read_only(self.T_parent_joint))
+        object.__setattr__(self, 'axis', read_only(self.axis))
+
+
+class Loaded(NamedTuple):
+    """
+    A shape that has been built.
+
+    :param body: the body in the shape's own frame.
+    :param content: SHA-256 of the file it came from, in hex; '' for a primitive.
+    """
+
+    body: ConvexBody
+    content: str
+
+
+class Shape(Protocol):
+    """A collision geometry as it is described; hashable, and nothing is read before `load`."""
+
+    def load(self) -> Loaded:
+        """Return a body that contains the geometry; raises TrajectoryGuardError."""
+
+
+class Collision(NamedTuple):
+    """
+    One collision geometry of a link.
+
+    :param T_link_shape: pose of the shape in the link frame, (4, 4) [m].
+    :param shape: what is there.
+    """
+
+    T_link_shape: np.ndarray
+    shape: Shape
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Robot:
+    """
+    A kinematic tree with collision geometry.
+
+    ``links[0]`` is the root and ``links[k + 1]`` is the child of ``joints[k]``; a joint comes
+    after the joint that moves its parent.
+
+    :param name: the description's own name.
+    :param root: root link; every pose is expressed in its frame.
+    :param joints: all joints in topological order, fixed ones included.
+    :param collisions: collision geometries of the links that have any, in the order of links.
+    :param source: bytes of the description, for the digest.
+    """
+
+    name: str
+    root: str
+    joints: tuple[Joint, ...]
+    collisions: Mapping[str, tuple[Collision, ...]] = field(repr=False)
+    source: bytes = field(repr=False)
+    _shapes: dict[Shape, Loaded] = field(init=False, repr=False, default_factory=dict)
+    _bodies: dict[str, tuple[ConvexBody, ...]] = field(
+        init=False, repr=False, default_factory=dict
+    )
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """All links, the root first, then the child of each joint."""
+        return (self.root, *(joint.child for joint in self.joints))
+
+    @property
+    def movable(self) -> tuple[Joint, ...]:
+        """All joints that are not fixed, mimic joints included, in topological order."""
+        return tuple(joint for joint in self.joints if joint.type is not JointType.FIXED)
+
+    @property
+    def collision_links(self) -> tuple[str, ...]:
+        """The links that have collision geometry, in the order of `links`."""
+        return tuple(self.collisions)
+
+    def bodies(self, link: str) -> tuple[ConvexBody, ...]:
+        """
+        Return convex bodies whose union contains the link's collision geometry.
+
+        Meshes are read when a link is first asked for, once.
+
+        :param link: name of a link.
+        :returns: bodies in the link frame [m]; empty for a link without collision geometry.
+        :raises RobotError: the link is unknown, or one of its meshes is missing or unusable.
+        """
+        if link not in self._bodies:
+            if link not in self.collisions and link not in self.links:
+                raise RobotError(Reason.ROBOT_INVALID, f'robot {self.name!r} has no link {link!r}')
+            self._bodies[link] = tuple(
+                self._load(collision.shape, link).body.moved(collision.T_link_shape)
+                for collision in self.collisions.get(link, ())
+            )
+        return self._bodies[link]
+
+    def digest(self) -> str:
+        """
+        Return the SHA-256 of the description and of every collision mesh, in hex.
+
+        It depends on the bytes of the files, not on where they lie.
+
+        :raises RobotError: a mesh is missing or unusable.
+        """
+        digest = hashlib.sha256(hashlib.sha256(self.source).digest())
+        for link, collisions in self.collisions.items():
+            for collision in collisions:
+                digest.update(self._load(collision.shape, link).content.encode())
+        return digest.hexdigest()
+
+    def _load(self, shape: Shape, link: str) -> Loaded:
+        if shape not in self._shapes:
+            try:
+                self._shapes[shape] = shape.load()
+            except RobotError as error:
+                raise RobotError(error.reason, f'link {link!r}: {error}') from error
+        return self._shapes[shape]
