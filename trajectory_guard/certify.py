@@ -1,0 +1,191 @@
+"""The verb: is the motion that a joint path describes clear of the scene at every instant?"""
+
+from collections.abc import Sequence
+import dataclasses
+import logging
+import threading
+import time
+
+import numpy as np
+
+from trajectory_guard.errors import Reason, TrajectoryGuardError
+from trajectory_guard.joint_path import INTERPOLATION, JointPath, joint_path
+from trajectory_guard.kernels.cover import cover
+from trajectory_guard.kernels.enclosure import Path
+from trajectory_guard.kernels.still import overlaps
+from trajectory_guard.request import motion_path, tracking_slack
+from trajectory_guard.result import NANOSECONDS, Interval, Result, Status, Verdict
+from trajectory_guard.settings import Settings
+from trajectory_guard.timeline import intervals
+from trajectory_guard.trajectory import JointState, Trajectory
+from trajectory_guard.workcell import Pairs, Workcell
+
+_log = logging.getLogger(__name__)
+
+
+def certify(
+    workcell: Workcell,
+    path: JointPath,
+    settings: Settings | None = None,
+    slack: np.ndarray | None = None,
+) -> Result:
+    """
+    Certify a joint path against the scene of a workcell.
+
+    :param workcell: robot and scene.
+    :param path: the motion of every movable joint of that robot.
+    :param settings: what is asked; the defaults if None.
+    :param slack: (n,) tracking tolerance per movable joint [rad or m]; None: the one value
+        of ``settings`` for every joint of the path.
+    :returns: intervals that partition [0, duration] and the verdict.
+    :raises TrajectoryGuardError: the path does not fit the robot, or moves nothing that could hit.
+    """
+    settings = settings or Settings()
+    begin = time.perf_counter()
+    if slack is None:
+        slack = tracking_slack(workcell.robot.movable, path, (), settings)
+    pairs = workcell.pairs(path.in_path)
+    motion = motion_path(workcell, path, slack)
+    stop = np.zeros(1, np.int64)
+    watchdog = _watchdog(settings.deadline_ns, stop)
+    try:
+        ints, floats, pieces = cover(
+            workcell.tree.chain,
+            workcell.links,
+            workcell.obstacles,
+            motion,
+            pairs.body,
+            pairs.obstacle,
+            settings.tolerance,
+            settings.clearance,
+            settings.max_pieces,
+            stop,
+        )
+    finally:
+        if watchdog is not None:
+            watchdog.cancel()
+    rows = intervals(
+        path.knots_ns,
+        ints,
+        floats,
+        workcell.link_names,
+        workcell.obstacle_names,
+        path.unknown_until_ns,
+    )
+    verdict, reason, message = _verdict(rows)
+    return Result(
+        verdict=verdict,
+        reason_code=reason,
+        message=message,
+        intervals=rows,
+        tolerance=settings.tolerance,
+        clearance=settings.clearance,
+        interpolation=INTERPOLATION,
+        robot_hash=workcell.robot_hash,
+        scene_hash=workcell.scene_hash,
+        compute_time=time.perf_counter() - begin,
+        pieces=int(pieces),
+        pairs_checked=pairs.checked,
+        unchecked_pairs=pairs.unchecked,
+        warnings=_warnings(workcell, motion, pairs, path),
+        duration_ns=path.duration_ns,
+    )
+
+
+def judge(
+    workcell: Workcell,
+    trajectory: Trajectory,
+    start: JointState | None = None,
+    settings: Settings | None = None,
+) -> Result:
+    """
+    Certify a trajectory message; whatever goes wrong is an answer, and never *free*.
+
+    :param workcell: robot and scene.
+    :param trajectory: the message.
+    :param start: where the robot is at time 0.
+    :param settings: what is asked; the defaults if None.
+    """
+    settings = settings or Settings()
+    try:
+        movable = workcell.robot.movable
+        path = joint_path(
+            movable,
+            trajectory,
+            start,
+            allowed_start_tolerance=settings.allowed_start_tolerance,
+            joint_limit_tolerance=settings.joint_limit_tolerance,
+            check_joint_limits=settings.check_joint_limits,
+            allow_nonzero_end_velocity=settings.allow_nonzero_end_velocity,
+        )
+        slack = tracking_slack(movable, path, trajectory.joint_names, settings)
+        result = certify(workcell, path, settings, slack)
+    except TrajectoryGuardError as error:
+        return Result.rejected(error, settings, trajectory.name)
+    except Exception as error:  # fail closed: an unforeseen error must not leave a request open
+        _log.exception('certification of %r failed', trajectory.name)
+        internal = TrajectoryGuardError(Reason.INTERNAL_ERROR, f'internal error: {error!r}')
+        return Result.rejected(internal, settings, trajectory.name)
+    return dataclasses.replace(result, name=trajectory.name)
+
+
+def _watchdog(deadline_ns: int | None, stop: np.ndarray) -> threading.Timer | None:
+    """Set the stop flag when the deadline has passed; at once for a deadline of zero."""
+    if deadline_ns is None:
+        return None
+    if deadline_ns == 0:
+        stop[0] = 1
+        return None
+    timer = threading.Timer(deadline_ns / NANOSECONDS, stop.fill, (1,))
+    timer.daemon = True
+    timer.start()
+    return timer
+
+
+def _verdict(rows: Sequence[Interval]) -> tuple[Verdict, str, str]:
+    """Return verdict, reason code and sentence for a partition."""
+    for status, verdict in (
+        (Status.COLLISION, Verdict.COLLISION),
+        (Status.SUSPECT, Verdict.SUSPECT),
+    ):
+        hits = [row for row in rows if row.status == status]
+        if hits:
+            row = hits[0]
+            where = f': {row.body} and {row.obstacle}' if row.body else ''
+            word = 'collision' if status == Status.COLLISION else 'not proved free'
+            return (
+                verdict,
+                row.reason,
+                f'{word} from {row.start_ns / NANOSECONDS:.6f} s{where}',
+            )
+    if rows and all(row.status == Status.FREE for row in rows):
+        return Verdict.FREE, '', ''
+    return Verdict.SUSPECT, Reason.INTERNAL_ERROR.value, 'no interval was certified'
+
+
+def _warnings(workcell: Workcell, motion: Path, pairs: Pairs, path: JointPath) -> tuple[str, ...]:
+    """Return what the verdict does not say: parts that touch without moving, limits unchecked."""
+    warnings = []
+    touching = overlaps(
+        workcell.tree.chain,
+        workcell.links,
+        workcell.obstacles,
+        motion,
+        pairs.still_body,
+        pairs.still_obstacle,
+    )
+    names = sorted(
+        {
+            (
+                workcell.link_names[pairs.still_body[i]],
+                workcell.obstacle_names[pairs.still_obstacle[i]],
+            )
+            for i in np.flatnonzero(touching)
+        }
+    )
+    if names:
+        listed = ', '.join(f'{body} and {obstacle}' for body, obstacle in names)
+        warnings.append(f'touching, but not moved by the trajectory, so not judged: {listed}')
+    if not path.limits_checked:
+        warnings.append('joint limits were not checked')
+    return tuple(warnings)

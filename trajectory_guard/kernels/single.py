@@ -1,0 +1,54 @@
+"""One body on one piece, for those who want to look at a motion rather than certify it."""
+
+import numpy as np
+
+from trajectory_guard.kernels.chain import POSE
+from trajectory_guard.kernels.enclosure import (
+    centre,
+    displacement,
+    enclosure,
+    fit,
+    fit_error,
+    rational,
+)
+from trajectory_guard.kernels.jit import entry
+from trajectory_guard.kernels.margin import chain_margin
+from trajectory_guard.kernels.solids import NODE
+
+
+@entry
+def link_motion(chain, links, path, body, segment, m, h):
+    """
+    Build the rational motion of one body on the piece s = m + h tau.
+
+    :param chain: :class:`~trajectory_guard.kernels.chain.Chain`.
+    :param links: :class:`~trajectory_guard.kernels.solids.Solids` in node frames.
+    :param path: :class:`~trajectory_guard.kernels.enclosure.Path`.
+    :param body: index of the body; it must hang on a node.
+    :param segment: index of the segment.
+    :param m: centre of the piece, h its half length, in [0, 1].
+    :returns: control matrices (K, 12), weights (K,), error of the motion without tracking, tracking
+        inflation, largest displacement from the centre pose [m], and whether the motion is usable.
+    """
+    nodes = len(chain.parent)
+    e = enclosure(nodes, nodes)
+    node = links.index[body, NODE]
+    j = node
+    while j >= 0:
+        e.needed[j] = True
+        j = chain.parent[j]
+    centre(chain, path, segment, m, h, e)
+    fit(chain, e)
+    rational(chain, e)
+    sweep, _, _, slack = displacement(chain, path, body, node, e)
+    error = fit_error(chain, path, body, node, e) + chain_margin(
+        float(chain.depth[node]), e.kappa[node], path.reach[body]
+    )
+    count = e.count[node]
+    matrices = np.empty((count, POSE))
+    weights = np.empty(count)
+    for i in range(count):
+        weights[i] = e.controls[node, i, POSE]
+        for k in range(POSE):
+            matrices[i, k] = e.points[node, i, k]
+    return matrices, weights, error, slack, sweep, e.sound[node]

@@ -1,0 +1,104 @@
+"""A request in the kernels' words: tolerances per joint, the path with its lever arms."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.joint_path import JointPath
+from trajectory_guard.kernels.chain import PRISMATIC
+from trajectory_guard.kernels.enclosure import Path
+from trajectory_guard.kernels.reach import lever_arms
+from trajectory_guard.robot import Joint
+from trajectory_guard.settings import Settings
+from trajectory_guard.workcell import Workcell
+
+# Coordinates beyond this would overflow somewhere in a product of control matrices [m or rad].
+LARGEST = 1e9
+
+
+def tracking_slack(
+    movable: Sequence[Joint], path: JointPath, commanded: Sequence[str], settings: Settings
+) -> np.ndarray:
+    """
+    Spread the tracking tolerance over the movable joints.
+
+    A mimic joint is off by its multiplier times what the joint it follows may be off.
+
+    :param movable: the robot's movable joints.
+    :param path: the joint path.
+    :param commanded: joint names of the trajectory, in its order.
+    :param settings: the request.
+    :returns: (n,) [rad or m].
+    :raises RequestError: the number of values is neither one nor the trajectory's joints.
+    """
+    values = settings.tracking_tolerance
+    if len(values) not in (1, len(commanded)):
+        raise RequestError(
+            Reason.INVALID_TRACKING_TOLERANCE,
+            f'tracking_tolerance has {len(values)} values for {len(commanded)} joints',
+        )
+    if len(values) == 1:
+        named = {
+            joint.name: values[0] for joint, inside in zip(movable, path.in_path) if inside
+        }
+    else:
+        named = dict(zip(commanded, values))
+    slack = np.zeros(len(movable))
+    for j, (joint, inside) in enumerate(zip(movable, path.in_path)):
+        if not inside:
+            continue
+        factor = 1.0
+        leader = joint
+        while leader.mimic is not None:
+            factor *= abs(leader.mimic.multiplier) * (1.0 + 2.0**-50)
+            leader = next(other for other in movable if other.name == leader.mimic.joint)
+        slack[j] = named[leader.name] * factor
+    return slack
+
+
+def motion_path(workcell: Workcell, path: JointPath, slack: np.ndarray) -> Path:
+    """
+    Return a path as kernel arrays, with the lever arms its prismatic joints allow.
+
+    :param workcell: robot and scene.
+    :param path: the motion of every movable joint of that robot.
+    :param slack: (n,) tracking tolerance per movable joint [rad or m].
+    :raises RequestError: the path is another robot's, or leaves the range of the kernels.
+    """
+    if path.joint_names != tuple(joint.name for joint in workcell.robot.movable):
+        raise RequestError(
+            Reason.INVALID_PARAMETER,
+            f'the path has joints {path.joint_names}, the robot '
+            f'{tuple(joint.name for joint in workcell.robot.movable)}',
+        )
+    size = np.abs(path.coefficients).sum(axis=2).max(axis=0) + path.coefficient_error.max(axis=0)
+    if not (np.isfinite(size).all() and (size <= LARGEST).all() and np.isfinite(slack).all()):
+        worst = int(np.argmax(~(size <= LARGEST)))
+        raise RequestError(
+            Reason.TOO_LARGE,
+            f'joint {path.joint_names[worst]!r} moves by {size[worst]:g}, more than {LARGEST:g}',
+        )
+    chain = workcell.tree.chain
+    bodies = len(workcell.link_names)
+    rho = np.empty((bodies, len(slack)))
+    reach = np.empty(bodies)
+    travel = np.where(chain.kind == PRISMATIC, size + slack, 0.0)
+    lever_arms(
+        chain,
+        workcell.link_nodes,
+        workcell.extent,
+        workcell.perpendicular,
+        workcell.offsets,
+        travel,
+        rho,
+        reach,
+    )
+    return Path(
+        coefficients=path.coefficients,
+        rounding=path.coefficient_error,
+        moving=(path.coefficients[:, :, 1:] != 0.0).any(axis=(0, 2)),
+        slack=slack,
+        rho=rho,
+        reach=reach,
+    )

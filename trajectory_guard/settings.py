@@ -1,0 +1,77 @@
+"""What a request asks for, checked once."""
+
+from dataclasses import dataclass
+import math
+
+from trajectory_guard.errors import Reason, RequestError
+
+# A proof at a tolerance below a nanometre would be a statement about rounding, not about robots.
+SMALLEST_TOLERANCE = 1e-9
+LARGEST_LENGTH = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """
+    The knobs of one certification.
+
+    :param tolerance: gaps larger than this are proved, smaller ones may be *suspect* [m].
+    :param clearance: distance that *free* must exceed [m].
+    :param tracking_tolerance: how far the robot may follow off the path; one value for every
+        joint of the trajectory, or one per joint in the trajectory's order [rad or m].
+    :param deadline_ns: wall-clock time for the answer; the rest is *suspect* [ns]; None: no limit.
+    :param max_pieces: motion pieces that may be examined; the rest is *suspect*.
+    :param allowed_start_tolerance: start state against a point 0 at time 0 [rad or m].
+    :param joint_limit_tolerance: how far the curve may leave the joint limits [rad or m].
+    :param check_joint_limits: False leaves limits unchecked, and the result says so.
+    :param allow_nonzero_end_velocity: accept a last point that does not come to rest.
+    :raises RequestError: a value is not finite, negative or out of range; the message names it.
+    """
+
+    tolerance: float = 1e-4
+    clearance: float = 0.0
+    tracking_tolerance: tuple[float, ...] = (0.0,)
+    deadline_ns: int | None = None
+    max_pieces: int = 200_000
+    allowed_start_tolerance: float = 0.01
+    joint_limit_tolerance: float = 1e-6
+    check_joint_limits: bool = True
+    allow_nonzero_end_velocity: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what no proof could use."""
+        if not SMALLEST_TOLERANCE <= self.tolerance <= LARGEST_LENGTH:
+            raise RequestError(
+                Reason.INVALID_TOLERANCE,
+                f'tolerance must lie in [{SMALLEST_TOLERANCE:g}, {LARGEST_LENGTH:g}] m, '
+                f'got {self.tolerance!r}',
+            )
+        if not 0.0 <= self.clearance <= LARGEST_LENGTH:
+            raise RequestError(
+                Reason.INVALID_CLEARANCE,
+                f'clearance must lie in [0, {LARGEST_LENGTH:g}] m, got {self.clearance!r}',
+            )
+        if not self.tracking_tolerance:
+            raise RequestError(
+                Reason.INVALID_TRACKING_TOLERANCE, 'tracking_tolerance must not be empty'
+            )
+        for value in self.tracking_tolerance:
+            if not (math.isfinite(value) and value >= 0.0):
+                raise RequestError(
+                    Reason.INVALID_TRACKING_TOLERANCE,
+                    f'tracking_tolerance must be finite and >= 0, got {value!r}',
+                )
+        if self.deadline_ns is not None and self.deadline_ns < 0:
+            raise RequestError(
+                Reason.INVALID_DEADLINE, f'deadline must be >= 0 s, got {self.deadline_ns} ns'
+            )
+        if self.max_pieces < 0:
+            raise RequestError(
+                Reason.INVALID_PARAMETER, f'max_pieces must be >= 0, got {self.max_pieces}'
+            )
+        for name in ('allowed_start_tolerance', 'joint_limit_tolerance'):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise RequestError(
+                    Reason.INVALID_PARAMETER, f'{name} must be finite and >= 0, got {value!r}'
+                )

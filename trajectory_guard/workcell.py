@@ -1,0 +1,130 @@
+"""A robot and its scene together, packed once for every request."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from trajectory_guard.errors import Reason, RobotError, SceneError
+from trajectory_guard.kernels.solids import FAR, NODE, Solids
+from trajectory_guard.pack import perpendicular, solids
+from trajectory_guard.robot import Robot
+from trajectory_guard.scene import Scene
+from trajectory_guard.tree import Tree, tree
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pairs:
+    """
+    Which bodies a set of commanded joints moves against which obstacles.
+
+    :param body: (P,) int64 packed bodies, and obstacle (P,) int64 packed obstacles, to check.
+    :param still_body: (Q,) int64, and still_obstacle (Q,) int64: pairs that the joints do not move.
+    :param checked: number of pairs of a link and an obstacle among the first.
+    :param unchecked: what is left out, in words.
+    """
+
+    body: np.ndarray
+    obstacle: np.ndarray
+    still_body: np.ndarray
+    still_obstacle: np.ndarray
+    checked: int
+    unchecked: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Workcell:
+    """
+    Everything about robot and scene that does not depend on the trajectory.
+
+    :param robot: the robot.
+    :param scene: obstacles in the robot's root frame.
+    :raises RobotError: the robot has no collision geometry, or a mesh of it is unusable.
+    :raises SceneError: the scene has no obstacle.
+    """
+
+    robot: Robot
+    scene: Scene
+    robot_hash: str = field(init=False)
+    scene_hash: str = field(init=False)
+    tree: Tree = field(init=False)
+    links: Solids = field(init=False)
+    obstacles: Solids = field(init=False)
+    link_names: tuple[str, ...] = field(init=False)
+    obstacle_names: tuple[str, ...] = field(init=False)
+    link_nodes: np.ndarray = field(init=False)
+    extent: np.ndarray = field(init=False)
+    perpendicular: np.ndarray = field(init=False)
+    offsets: np.ndarray = field(init=False)
+    _pairs: dict[bytes, Pairs] = field(init=False, repr=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Load the geometry and pack it."""
+
+        def keep(name: str, value: object) -> None:
+            object.__setattr__(self, name, value)
+
+        folded = tree(self.robot)
+        names: list[str] = []
+        bodies = []
+        for link in self.robot.collision_links:
+            for body in self.robot.bodies(link):
+                names.append(link)
+                bodies.append(body.moved(folded.link_pose[link]))
+        if not bodies:
+            raise RobotError(
+                Reason.ROBOT_EMPTY, f'robot {self.robot.name!r} has no collision geometry'
+            )
+        obstacle_names = [o.name for o in self.scene.obstacles for _ in o.bodies]
+        if not obstacle_names:
+            raise SceneError(Reason.SCENE_EMPTY, 'the scene has no obstacle')
+        keep('tree', folded)
+        keep('links', solids(bodies, [folded.link_node[name] for name in names]))
+        keep(
+            'obstacles',
+            solids([b for o in self.scene.obstacles for b in o.bodies], [-1] * len(obstacle_names)),
+        )
+        keep('link_names', tuple(names))
+        keep('obstacle_names', tuple(obstacle_names))
+        keep('link_nodes', self.links.index[:, NODE].copy())
+        keep('extent', self.links.size[:, FAR].copy())
+        keep('perpendicular', np.array([perpendicular(body) for body in bodies]))
+        keep('offsets', np.array([folded.link_path[name] for name in names]))
+        keep('robot_hash', self.robot.digest())
+        keep('scene_hash', self.scene.digest)
+
+    def pairs(self, in_path: np.ndarray) -> Pairs:
+        """
+        Return the pairs for a set of commanded joints.
+
+        :param in_path: (n,) bool per node.
+        :raises RobotError: the joints move no link with collision geometry.
+        """
+        key = in_path.tobytes()
+        if key not in self._pairs:
+            self._pairs[key] = self._pair_up(in_path)
+        return self._pairs[key]
+
+    def _pair_up(self, in_path: np.ndarray) -> Pairs:
+        moved = np.zeros(len(in_path), bool)
+        for j, parent in enumerate(self.tree.chain.parent):
+            moved[j] = in_path[j] or (parent >= 0 and moved[parent])
+        body_moved = np.array([node >= 0 and moved[node] for node in self.link_nodes])
+        if not body_moved.any():
+            raise RobotError(
+                Reason.ROBOT_EMPTY, 'no joint of the trajectory moves a link with collision geometry'
+            )
+        every = np.arange(len(self.obstacle_names), dtype=np.int64)
+        moving = np.flatnonzero(body_moved).astype(np.int64)
+        still = np.flatnonzero(~body_moved).astype(np.int64)
+        moving_links = {self.link_names[b] for b in moving}
+        still_links = sorted({self.link_names[b] for b in still})
+        unchecked = ['links of the robot against each other']
+        unchecked += [f'{link} against the scene: no joint moves it' for link in still_links]
+        return Pairs(
+            body=np.repeat(moving, len(every)),
+            obstacle=np.tile(every, len(moving)),
+            still_body=np.repeat(still, len(every)),
+            still_obstacle=np.tile(every, len(still)),
+            checked=len(moving_links) * len(self.scene.obstacles),
+            unchecked=tuple(unchecked),
+        )
