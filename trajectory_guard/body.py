@@ -26,10 +26,14 @@ LARGEST_COORDINATE = 1e9
 # its largest entry: sqrt(3) * 20 = 34.7; the rest covers the rounding of the bound itself.
 TRANSFORM_ROUNDING = 64.0
 
+# Rounding of a face's plane, in units of U (reach + |d|): an entry of R n errs by 16 sqrt(3) + 6
+# and the normal by sqrt(3) times that, 58; making it a unit vector moves it as much again, 60;
+# the offset's own sums add 8.
+FACE_ROUNDING = 160.0
+
 # The orthogonality a transform must have: what rounding can leave of an exact rotation, and a
 # little; TRANSFORM_ROUNDING counts 16 U per entry, which is 3 * 2 * 16 U of R^T R.
 RIGID_TOLERANCE = 128.0 * U
-
 
 IDENTITY = np.eye(4)
 IDENTITY.flags.writeable = False
@@ -127,20 +131,25 @@ class ConvexBody:
         R, t = T[:3, :3], T[:3, 3]
         reach = np.abs(self.vertices).sum(axis=1).max() + np.abs(t).sum()
         rounding = TRANSFORM_ROUNDING * U * (reach + self.disc_radius)
-        faces = np.empty_like(self.faces)
-        faces[:, :3] = self.faces[:, :3] @ R.T
-        # The polytope lies in the bounding sphere, so an error of the normal acts on that reach.
-        lever = np.abs(t).sum() + np.abs(self.center).sum() + self.radius
-        inward = TRANSFORM_ROUNDING * U * (lever + np.abs(self.faces[:, 3]))
-        faces[:, 3] = self.faces[:, 3] + faces[:, :3] @ t - 2.0 * inward
         disc_axis = R @ self.disc_axis if self.disc_radius else self.disc_axis
         return ConvexBody(
             vertices=self.vertices @ R.T + t,
             ball=(self.ball + rounding) * (1.0 + 4.0 * U),
             disc_radius=self.disc_radius,
             disc_axis=disc_axis / np.linalg.norm(disc_axis),
-            faces=faces,
+            faces=self._faces_moved(R, t),
         )
+
+    def _faces_moved(self, R: np.ndarray, t: np.ndarray) -> np.ndarray:
+        if not len(self.faces):
+            return self.faces
+        normals = self.faces[:, :3] @ R.T
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        offsets = self.faces[:, 3] + normals @ t
+        # The polytope lies in the bounding sphere, so an error of a normal acts on that reach.
+        reach = np.abs(t).sum() + np.abs(self.center).sum() + self.radius
+        inward = FACE_ROUNDING * U * (reach + np.abs(self.faces[:, 3]))
+        return np.column_stack((normals, offsets - inward))
 
     def _radius_about(self, center: np.ndarray) -> float:
         """

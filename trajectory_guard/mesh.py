@@ -1,0 +1,81 @@
+"""Mesh files as convex bodies."""
+
+from dataclasses import dataclass
+import hashlib
+from pathlib import Path
+
+import numpy as np
+
+from trajectory_guard.body import ConvexBody, LARGEST_COORDINATE, U
+from trajectory_guard.errors import Reason, RobotError
+from trajectory_guard.hull import convex_hull
+from trajectory_guard.inscribed import inscribed_polytope
+from trajectory_guard.mesh_formats import READERS, Triangles
+from trajectory_guard.resource import places
+from trajectory_guard.robot import Loaded
+
+
+@dataclass(frozen=True, slots=True)
+class MeshFile:
+    """
+    A mesh as a description names it; the file is found and read when it is loaded.
+
+    :param uri: package URI, file URI or path.
+    :param folder: where relative paths start.
+    :param scale: factor along x, y, z; negative ones mirror.
+    """
+
+    uri: str
+    folder: Path | None = None
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+    def load(self) -> Loaded:
+        """
+        Return the hull of the mesh, and the hash of the file it was built from.
+
+        :raises RobotError: MESH_MISSING names the places looked at, MESH_INVALID what is wrong.
+        """
+        path = self._find()
+        reader = READERS.get(path.suffix.lower())
+        if reader is None:
+            raise RobotError(
+                Reason.MESH_INVALID, f'mesh {self.uri!r} is not one of {", ".join(READERS)}'
+            )
+        try:
+            content = path.read_bytes()
+            body = mesh_body(reader(content), self.scale)
+        except (OSError, ValueError) as error:
+            raise RobotError(
+                Reason.MESH_INVALID, f'mesh {self.uri!r} ({path}): {error}'
+            ) from error
+        return Loaded(body, hashlib.sha256(content).hexdigest())
+
+    def _find(self) -> Path:
+        looked = list(dict.fromkeys(places(self.uri, self.folder)))
+        for path in looked:
+            if path.is_file():
+                return path
+        where = ', '.join(map(str, looked)) or 'nowhere: the URI names no place on this machine'
+        raise RobotError(Reason.MESH_MISSING, f'mesh {self.uri!r} not found; looked at {where}')
+
+
+def mesh_body(mesh: Triangles, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> ConvexBody:
+    """
+    Return the convex hull of a mesh, and an inscribed polytope if the mesh is a convex solid.
+
+    :param mesh: the surface; its corners may be off by its rounding.
+    :param scale: factor along x, y, z.
+    :raises ValueError: a scaled coordinate is too large.
+    """
+    scaled = mesh.points * scale + 0.0
+    if not np.abs(scaled).max() <= LARGEST_COORDINATE:
+        raise ValueError(f'a coordinate exceeds {LARGEST_COORDINATE:g} m')
+    points, inverse = np.unique(scaled, axis=0, return_inverse=True)
+    triangles = inverse.reshape(-1)[mesh.triangles]
+    # The file's rounding grows with the scale; scaling rounds each coordinate by U.
+    rounding = 2.0 * mesh.rounding * max(map(abs, scale))
+    if scale != (1.0, 1.0, 1.0):
+        rounding += 2.0 * U * np.abs(points).max()
+    hull = convex_hull(points)
+    faces = inscribed_polytope(points, triangles, hull, rounding)
+    return ConvexBody(hull.vertices, ball=(hull.ball + rounding) * (1.0 + 4.0 * U), faces=faces)
