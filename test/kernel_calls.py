@@ -4,6 +4,7 @@ from numba import njit
 
 from trajectory_guard.kernels import chain as chain_kernels
 from trajectory_guard.kernels import deepest as deepest_kernels
+from trajectory_guard.kernels import economised as economised_kernels
 from trajectory_guard.kernels import gjk as gjk_kernels
 from trajectory_guard.kernels import piece as piece_kernels
 from trajectory_guard.kernels import separation as separation_kernels
@@ -17,6 +18,8 @@ _restrict = piece_kernels.restrict
 _fit_half_angle = piece_kernels.fit_half_angle
 _fit_slide = piece_kernels.fit_slide
 _factors = chain_kernels.factors
+_fit_rotation = economised_kernels.fit_rotation
+_economised = economised_kernels.economised
 
 
 @njit
@@ -75,3 +78,15 @@ def fit_slide(d, p, controls):
 def factors(kind, u, cosine, sine, weight):
     """Call the Bernstein factors of a joint."""
     return _factors(kind, u, 0, cosine, sine, weight)
+
+
+@njit
+def fit_rotation(phi, span):
+    """Call the polynomial cosine and sine."""
+    return _fit_rotation(phi, span)
+
+
+@njit
+def economised(p):
+    """Call the folding of a product to degree 5."""
+    return _economised(p)

@@ -10,7 +10,7 @@ from random_robot import box_body, hull_body
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from trajectory_guard.kernels.gjk import OVERLAP, ROUNDS, SEPARATED
+from trajectory_guard.kernels.gjk import OVERLAP, RELATIVE, ROUNDS, SEPARATED
 from trajectory_guard.pack import solids
 
 
@@ -46,7 +46,7 @@ def run(points, links, obstacles):
 
 @pytest.mark.parametrize('apart', [0.5, 3.0, 4.0, 10.0])
 def test_distance_and_direction_agree_with_coal(apart):
-    """The distance is coal's, the direction's support difference is the distance."""
+    """coal's distance lies between the direction's support difference and the nearest points."""
     rng = np.random.default_rng(int(10 * apart))
     request = coal.DistanceRequest()
     request.gjk_tolerance = 1e-10

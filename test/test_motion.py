@@ -8,7 +8,7 @@ from random_robot import core, link_poses, random_path, random_workcell
 
 from trajectory_guard.errors import RequestError
 from trajectory_guard.joint_path import joint_path
-from trajectory_guard.motion import rational_motion
+from trajectory_guard.motion import Builder, rational_motion
 
 # scipy's and pinocchio's own rounding, next to metres.
 JUDGE = 1e-14
@@ -26,8 +26,9 @@ def place(level, numerator, tau):
     return (2 * numerator + 1 + tau) / 2 ** (level + 1)
 
 
+@pytest.mark.parametrize('builder', Builder)
 @pytest.mark.parametrize('robot', ROBOTS)
-def test_bound_contains_pinocchio_on_real_robots(robot):
+def test_bound_contains_pinocchio_on_real_robots(robot, builder):
     """Every link's vertices, at dense instants of random pieces, lie within the error."""
     rng = np.random.default_rng(1)
     cell = workcell(robot)
@@ -39,7 +40,9 @@ def test_bound_contains_pinocchio_on_real_robots(robot):
         for segment, numerator, level in pieces(rng, 12, len(path.coefficients), 5):
             body = int(rng.choice(np.flatnonzero(cell.link_nodes >= 0)))
             link = cell.link_names[body]
-            motion = rational_motion(cell, path, body, segment, numerator, level)
+            motion = rational_motion(
+                cell, path, body, segment, numerator, level, builder=builder
+            )
             for tau in np.linspace(-1.0, 1.0, 9):
                 s = place(level, numerator, tau)
                 q = (path.coefficients[segment] * s ** np.arange(6)).sum(axis=1)
@@ -59,9 +62,10 @@ def distance(true, pose, T_node_link, points):
     return np.linalg.norm(off, axis=1).max()
 
 
+@pytest.mark.parametrize('builder', Builder)
 @pytest.mark.parametrize('seed', range(6))
 @pytest.mark.parametrize('spread', [1e-6, 0.1, 1.0, 30.0])
-def test_bound_contains_any_robot(seed, spread):
+def test_bound_contains_any_robot(seed, spread, builder):
     """Any axes, slides, branches, fixed and mimic joints, tracking errors, tiny and huge turns."""
     rng = np.random.default_rng(seed)
     cell = random_workcell(rng, joints=6)
@@ -70,7 +74,7 @@ def test_bound_contains_any_robot(seed, spread):
     for segment, numerator, level in pieces(rng, 12, len(path.coefficients), 7):
         body = int(rng.choice(np.flatnonzero(cell.link_nodes >= 0)))
         link = cell.link_names[body]
-        motion = rational_motion(cell, path, body, segment, numerator, level, slack)
+        motion = rational_motion(cell, path, body, segment, numerator, level, slack, builder)
         points = core(cell.robot.bodies(link)[0], rng)
         T = cell.tree.link_pose[link]
         middle = None
@@ -88,7 +92,8 @@ def test_bound_contains_any_robot(seed, spread):
             assert np.linalg.norm(moved, axis=1).max() <= motion.sweep + JUDGE * scale
 
 
-def test_true_points_lie_in_the_hull_of_the_control_points():
+@pytest.mark.parametrize('builder', Builder)
+def test_true_points_lie_in_the_hull_of_the_control_points(builder):
     """In any direction no true point leaves the control points by more than the error."""
     rng = np.random.default_rng(5)
     cell = random_workcell(rng, joints=6)
@@ -96,7 +101,9 @@ def test_true_points_lie_in_the_hull_of_the_control_points():
     for segment, numerator, level in pieces(rng, 30, len(path.coefficients), 4):
         body = int(rng.choice(np.flatnonzero(cell.link_nodes >= 0)))
         link = cell.link_names[body]
-        motion = rational_motion(cell, path, body, segment, numerator, level)
+        motion = rational_motion(
+            cell, path, body, segment, numerator, level, builder=builder
+        )
         assert (motion.weights > 0.0).all()
         x = cell.robot.bodies(link)[0].vertices[0]
         local = cell.tree.link_pose[link] @ [*x, 1.0]

@@ -28,7 +28,7 @@ def leaves(rng):
             # At their common instant a pose would be both free and overlapping.
             if rows and {status, rows[-1][4]} == {cover.FREE, cover.COLLISION}:
                 status = cover.SUSPECT
-            rows.append((segment, k, k + 1, level, status, 0, 0, 0))
+            rows.append((segment, k, k + 1, level, status, 0, 0, 0, 0))
 
     for segment in range(segments):
         split(segment, 0, 0)
@@ -69,9 +69,9 @@ def test_partition_is_exact_and_free_only_shrinks(seed):
 def test_neighbours_of_one_status_merge_and_name_the_smallest_gap():
     """A run of suspect leaves is one interval with the worst pair's place."""
     ints = np.array(
-        [[0, 0, 1, 2, cover.FREE, 0, -1, -1]]
-        + [[0, k, k + 1, 2, cover.SUSPECT, 0, k - 1, 0] for k in (1, 2)]
-        + [[0, 3, 4, 2, cover.FREE, 0, -1, -1]]
+        [[0, 0, 1, 2, cover.FREE, 0, -1, -1, 0]]
+        + [[0, k, k + 1, 2, cover.SUSPECT, 0, k - 1, 0, 0] for k in (1, 2)]
+        + [[0, 3, 4, 2, cover.FREE, 0, -1, -1, 0]]
     )
     floats = np.array([[0.0] * 5, [-0.1, 0.3, 1, 2, 3], [-0.2, 0.1, 4, 5, 6], [0.0] * 5])
     rows = intervals(np.array([0, 100]), ints, floats, ['a', 'b'], ['box'])
@@ -87,16 +87,34 @@ def test_neighbours_of_one_status_merge_and_name_the_smallest_gap():
 
 def test_a_pose_without_duration_keeps_its_status():
     """A trajectory of one point is an interval of length zero, not an empty answer."""
-    ints = np.array([[0, 0, 1, 0, cover.COLLISION, 0, 0, 0]])
+    ints = np.array([[0, 0, 1, 0, cover.COLLISION, 0, 0, 0, 0]])
     rows = intervals(np.array([0, 0]), ints, np.zeros((1, 5)), ['a'], ['box'])
     assert [(r.start_ns, r.end_ns, r.status) for r in rows] == [(0, 0, Status.COLLISION)]
 
 
 def test_unknown_start_is_suspect():
     """The time before the first point is never skipped."""
-    ints = np.array([[0, 0, 1, 0, cover.FREE, 0, -1, -1]])
+    ints = np.array([[0, 0, 1, 0, cover.FREE, 0, -1, -1, 0]])
     rows = intervals(np.array([70, 170]), ints, np.zeros((1, 5)), ['a'], ['box'], 70)
     assert [(r.start_ns, r.end_ns, r.status, r.reason) for r in rows] == [
         (0, 70, Status.SUSPECT, 'start_state_unknown'),
         (70, 170, Status.FREE, ''),
     ]
+
+
+def test_a_run_without_collision_keeps_its_widest_witness():
+    """Of two leaves with a proved middle the wider middle is cut out; a run with a collision is left."""
+    suspect = [0, 0, 0, 2, cover.SUSPECT, 0, 0, 0, 0]
+    ints = np.array([suspect, suspect, suspect])
+    ints[:, cover.START] = 0, 1, 2
+    ints[:, cover.END] = 1, 2, 4
+    ints[:, cover.WITNESS] = 0, 1, 3
+    rows = intervals(np.array([0, 4 << 20]), ints, np.zeros((3, 5)), ['a'], ['box'])
+    assert [(r.start_ns, r.end_ns, r.status) for r in rows] == [
+        (0, 5 << 18, Status.SUSPECT),
+        (5 << 18, 7 << 18, Status.COLLISION),
+        (7 << 18, 4 << 20, Status.SUSPECT),
+    ]
+    ints[0, cover.STATUS] = cover.COLLISION
+    rows = intervals(np.array([0, 4 << 20]), ints, np.zeros((3, 5)), ['a'], ['box'])
+    assert [r.status for r in rows] == [Status.COLLISION, Status.SUSPECT]

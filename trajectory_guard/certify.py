@@ -11,6 +11,7 @@ import numpy as np
 from trajectory_guard.errors import Reason, TrajectoryGuardError
 from trajectory_guard.joint_path import INTERPOLATION, JointPath, joint_path
 from trajectory_guard.kernels.cover import cover
+from trajectory_guard.kernels.enclosure import ECONOMISED
 from trajectory_guard.kernels.enclosure import Path
 from trajectory_guard.kernels.still import overlaps
 from trajectory_guard.request import motion_path, tracking_slack
@@ -60,6 +61,7 @@ def certify(
             settings.clearance,
             settings.max_pieces,
             stop,
+            ECONOMISED,
         )
     finally:
         if watchdog is not None:

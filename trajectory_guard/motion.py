@@ -1,15 +1,24 @@
 """The rational motion of a link on a piece of time, with a certified error."""
 
 from dataclasses import dataclass
+from enum import IntEnum
 import math
 
 import numpy as np
 
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.joint_path import JointPath
+from trajectory_guard.kernels import enclosure
 from trajectory_guard.kernels.single import link_motion
 from trajectory_guard.request import motion_path
 from trajectory_guard.workcell import Workcell
+
+
+class Builder(IntEnum):
+    """How a motion is built: exact rational curves, or polynomials economised along the chain."""
+
+    RATIONAL = enclosure.RATIONAL
+    ECONOMISED = enclosure.ECONOMISED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +66,7 @@ def rational_motion(
     numerator: int = 0,
     level: int = 0,
     slack: np.ndarray | None = None,
+    builder: Builder = Builder.RATIONAL,
 ) -> RationalMotion:
     """
     Build the rational motion of a body on [numerator, numerator + 1] / 2^level of a segment.
@@ -68,6 +78,7 @@ def rational_motion(
     :param numerator: dyadic place of the piece.
     :param level: its power of two.
     :param slack: (n,) tracking tolerance per movable joint; none if None.
+    :param builder: how; an economised motion is a polynomial, its weights are the binomials.
     :raises RequestError: the piece does not exist, the body does not move, or the joints turn too far
         in the piece for positive weights.
     """
@@ -86,7 +97,10 @@ def rational_motion(
         segment,
         (2 * numerator + 1) * half,
         half,
+        int(builder),
     )
+    if builder == Builder.ECONOMISED:
+        weights *= [math.comb(len(weights) - 1, i) for i in range(len(weights))]
     if not (sound and math.isfinite(error)):
         raise RequestError(
             Reason.INVALID_PARAMETER, f'piece {numerator}/2^{level} turns too far for one motion'

@@ -21,17 +21,22 @@ import numpy as np
 
 from trajectory_guard.kernels.deepest import deepest, depth
 from trajectory_guard.kernels.enclosure import (
+    build,
     centre,
     displacement,
     enclosure,
     fit,
     fit_error,
-    rational,
 )
 from trajectory_guard.kernels.gjk import OVERLAP, ROUNDS, gjk
 from trajectory_guard.kernels.jit import entry, kernel
 from trajectory_guard.kernels.margin import UP, chain_margin, sphere_margin
-from trajectory_guard.kernels.separation import allowance, box_distance, separation
+from trajectory_guard.kernels.separation import (
+    allowance,
+    box_direction,
+    box_distance,
+    separation,
+)
 from trajectory_guard.kernels.solids import (
     BALL,
     CENTRE,
@@ -51,14 +56,15 @@ BY_DEPTH = 1
 BY_BUDGET = 2
 BY_STOP = 3
 
+FINEST_WITNESS = 12
 DEEPEST_LEVEL = 48  # times are exact dyadic numbers in a double up to here
-SWEPT_ROUNDS = 8  # a direction for a whole piece either comes soon or the piece is too long
+SWEPT_ROUNDS = 12  # a direction for a whole piece either comes soon or the piece is too long
 CLOSED = 0
 OPEN = 1
 OVERLAPS = 2  # at every instant of the piece
 
 # columns of a leaf's integers and floats
-SEGMENT, START, END, LEVEL, STATUS, REASON, BODY, OBSTACLE = range(8)
+SEGMENT, START, END, LEVEL, STATUS, REASON, BODY, OBSTACLE, WITNESS = range(9)
 LOWER, UPPER, X, Y, Z = range(5)
 
 
@@ -85,6 +91,7 @@ def _leaf(ints, floats, row, segment, start, end, level, status, reason, pair, i
     ints[row, REASON] = reason
     ints[row, BODY] = pair[0]
     ints[row, OBSTACLE] = pair[1]
+    ints[row, WITNESS] = 0
     for k in range(5):
         floats[row, k] = info[k]
 
@@ -241,20 +248,12 @@ def _near_pairs(chain, links, obstacles, path, pair_body, pair_obstacle, clearan
 
 @kernel
 def _first_direction(way, i, body, b, obstacles, o):
-    """Return the inherited direction of a pair, or the one between the centres."""
+    """Return the inherited direction of a pair, or the one from the obstacle's box to the sphere's centre."""
     nx = way[i, 0]
     ny = way[i, 1]
     nz = way[i, 2]
     if nx == 0.0 and ny == 0.0 and nz == 0.0:
-        nx = body[b, 4] - obstacles.place[o, CENTRE]
-        ny = body[b, 5] - obstacles.place[o, CENTRE + 1]
-        nz = body[b, 6] - obstacles.place[o, CENTRE + 2]
-        length = math.sqrt(nx * nx + ny * ny + nz * nz)
-        if not length > 0.0:
-            return 0.0, 0.0, 1.0
-        nx /= length
-        ny /= length
-        nz /= length
+        nx, ny, nz = box_direction(body[b, 4], body[b, 5], body[b, 6], obstacles, o)
     return nx, ny, nz
 
 
@@ -337,51 +336,43 @@ def _pair(chain, links, obstacles, path, b, o, i, tolerance, clearance, e, body,
     info[5] = 0.0
     info[6] = math.inf
     nx, ny, nz = _first_direction(way, i, body, b, obstacles, o)
-    inherited = way[i, 0] != 0.0 or way[i, 1] != 0.0 or way[i, 2] != 0.0
-    if sound and inherited:
-        info[LOWER] = separation(
-            nx, ny, nz, e.points, node, count, links, b, obstacles, o, error, levels, kappa, reach
-        )
-        if info[LOWER] > limit:
-            return CLOSED
-    state = gjk(
-        nx, ny, nz, e.pose, node, 1, links, b, obstacles, o, math.inf, 0.02 * tolerance,
-        ROUNDS, s, w, out,
-    )
     balls = links.size[b, BALL] + obstacles.size[o, BALL]
     margin = chain_margin(levels, kappa, reach) + sphere_margin(reach, obstacles.size[o, FAR])
-    info[UPPER] = out[4] - balls + fuzz + margin
-    info[X] = out[5]
-    info[Y] = out[6]
-    info[Z] = out[7]
-    if state != OVERLAP and sound:
+    needed = limit + allowance(links, b, obstacles, o, error, levels, kappa, reach)
+    # First the whole piece, then its centre: most pairs are closed by the first direction.
+    for attempt in range(2):
+        if attempt == 1:
+            state = gjk(
+                nx, ny, nz, e.pose, node, 1, links, b, obstacles, o, math.inf, 0.02 * tolerance,
+                ROUNDS, s, w, out,
+            )
+            info[UPPER] = out[4] - balls + fuzz + margin
+            info[X] = out[5]
+            info[Y] = out[6]
+            info[Z] = out[7]
+            if state == OVERLAP or not sound:
+                break
+            _near_bound(out[0], out[1], out[2], out, balls, e, node, count, error + margin, info)
+        elif sound:
+            gjk(
+                nx, ny, nz, e.points, node, count, links, b, obstacles, o, needed,
+                0.02 * tolerance, SWEPT_ROUNDS, s, w, out,
+            )
+        else:
+            continue
         nx = out[0]
         ny = out[1]
         nz = out[2]
-        _near_bound(nx, ny, nz, out, balls, e, node, count, error + margin, info)
-        needed = limit + allowance(links, b, obstacles, o, error, levels, kappa, reach)
-        possible = out[3] > needed
-        for attempt in range(2):
-            if attempt == 1:
-                gjk(
-                    nx, ny, nz, e.points, node, count, links, b, obstacles, o, needed,
-                    0.02 * tolerance, SWEPT_ROUNDS, s, w, out,
-                )
-                nx = out[0]
-                ny = out[1]
-                nz = out[2]
-            lower = separation(
-                nx, ny, nz, e.points, node, count, links, b, obstacles, o, error, levels, kappa, reach
-            )
-            if lower > info[LOWER]:
-                info[LOWER] = lower
-                way[i, 0] = nx
-                way[i, 1] = ny
-                way[i, 2] = nz
-            if lower > limit:
-                return CLOSED
-            if not possible:
-                break
+        lower = separation(
+            nx, ny, nz, e.points, node, count, links, b, obstacles, o, error, levels, kappa, reach
+        )
+        if lower > info[LOWER]:
+            info[LOWER] = lower
+            way[i, 0] = nx
+            way[i, 1] = ny
+            way[i, 2] = nz
+        if lower > limit:
+            return CLOSED
     if info[UPPER] <= fuzz + margin:
         if _entangled(links, b, obstacles, o, e, error, fuzz, margin, lp, found, info) == OVERLAPS:
             return OVERLAPS
@@ -420,30 +411,23 @@ def _settled(info, limit, sweep, tolerance):
 
 
 @kernel
-def _suspect(ints, floats, row, segment, k, level, pair, info, linear):
+def _witness(level, depth_sum, linear):
     """
-    Write the leaves of a suspect piece and return their number.
+    Return w such that the middle 2^-w of a piece provably collides, 0 if none is known.
 
-    If a common point was proved at the centre, the instants around it at which the link cannot have
-    moved by the depth are a collision of their own.
+    A point common to both solids at the centre by ``depth_sum`` in all stays common until the link has
+    moved by that much, and it moves at most linearly in the time from the centre.
     """
-    if info[5] > 0.0:
-        split = 1
-        reach = 0.5 * linear
-        while split < 12 and not reach < info[5]:
-            split += 1
-            reach *= 0.5
-        if reach < info[5] and level + split + 1 <= 60:
-            base = k << (split + 1)
-            middle = base + (1 << split)
-            end = (k + 1) << (split + 1)
-            fine = level + split + 1
-            _leaf(ints, floats, row, segment, base, middle - 1, fine, SUSPECT, BY_TOLERANCE, pair, info)
-            _leaf(ints, floats, row + 1, segment, middle - 1, middle + 1, fine, COLLISION, BY_TOLERANCE, pair, info)
-            _leaf(ints, floats, row + 2, segment, middle + 1, end, fine, SUSPECT, BY_TOLERANCE, pair, info)
-            return 3
-    _leaf(ints, floats, row, segment, k, k + 1, level, SUSPECT, BY_TOLERANCE, pair, info)
-    return 1
+    if not depth_sum > 0.0:
+        return 0
+    w = 1
+    reach = 0.5 * linear
+    while w < FINEST_WITNESS and not reach < depth_sum:
+        w += 1
+        reach *= 0.5
+    if reach < depth_sum and level + w + 1 <= DEEPEST_LEVEL + FINEST_WITNESS:
+        return w
+    return 0
 
 
 @kernel
@@ -464,7 +448,7 @@ def _push(stack, row, k, level, first, last):
 
 
 @entry
-def cover(chain, links, obstacles, path, pair_body, pair_obstacle, tolerance, clearance, max_pieces, stop):
+def cover(chain, links, obstacles, path, pair_body, pair_obstacle, tolerance, clearance, max_pieces, stop, builder):
     """
     Cover all segments of a path.
 
@@ -477,7 +461,8 @@ def cover(chain, links, obstacles, path, pair_body, pair_obstacle, tolerance, cl
     :param clearance: distance that must be exceeded [m].
     :param max_pieces: pieces to examine before the rest is given up as suspect.
     :param stop: (1,) int64; another thread sets it non-zero to have the rest given up.
-    :returns: leaves in time order, integers (L, 8) and floats (L, 5), and the pieces examined.
+    :param builder: how motions are built, ``enclosure.RATIONAL`` or ``ECONOMISED``.
+    :returns: leaves in time order, integers (L, 9) and floats (L, 5), and the pieces examined.
     """
     nodes = len(chain.parent)
     longest = 0
@@ -489,7 +474,7 @@ def cover(chain, links, obstacles, path, pair_body, pair_obstacle, tolerance, cl
                 moving += 1
             i = chain.parent[i]
         longest = max(longest, moving)
-    e = enclosure(nodes, longest)
+    e = enclosure(nodes, longest, builder)
     pairs = len(pair_body)
     body = np.empty((len(links.index), 10))
     live = np.empty((4 * pairs + 16, 1), np.int64)
@@ -504,7 +489,7 @@ def cover(chain, links, obstacles, path, pair_body, pair_obstacle, tolerance, cl
     info = np.zeros(8)
     worst = np.zeros(8)
     stack = np.empty((2 * DEEPEST_LEVEL + 4, 4), np.int64)
-    ints = np.empty((64, 8), np.int64)
+    ints = np.empty((64, 9), np.int64)
     floats = np.empty((64, 5))
     leaves = 0
     pieces = 0
@@ -518,8 +503,8 @@ def cover(chain, links, obstacles, path, pair_body, pair_obstacle, tolerance, cl
             level = stack[height, 1]
             first = stack[height, 2]
             last = stack[height, 3]
-            ints = _grow(ints, leaves + 4)
-            floats = _grow(floats, leaves + 4)
+            ints = _grow(ints, leaves + 1)
+            floats = _grow(floats, leaves + 1)
             if reason < 0 and pieces >= max_pieces:
                 reason = BY_BUDGET
             if reason < 0 and stop[0] != 0:
@@ -547,12 +532,12 @@ def cover(chain, links, obstacles, path, pair_body, pair_obstacle, tolerance, cl
             if top > last:
                 status = -1
                 _need(chain, links, pair_body, live, last, top, e)
-                fit(chain, e)
+                fit(chain, e, builder)
                 hopeless = _hopeless(
                     links, pair_body, live, last, top, chain, path, e, body, tolerance
                 )
                 if level >= DEEPEST_LEVEL or not hopeless:
-                    rational(chain, e)
+                    build(chain, e, builder)
                     top = _near_pairs(
                         chain, links, obstacles, path, pair_body, pair_obstacle, clearance, e,
                         body, live, way, last, top,
@@ -600,9 +585,9 @@ def cover(chain, links, obstacles, path, pair_body, pair_obstacle, tolerance, cl
                     _leaf(ints, floats, leaves, segment, k, k + 1, level, SUSPECT, BY_DEPTH, pair, worst)
                     leaves += 1
                 else:
-                    leaves += _suspect(
-                        ints, floats, leaves, segment, k, level, pair, worst, body[pair[0], 1]
-                    )
+                    _leaf(ints, floats, leaves, segment, k, k + 1, level, SUSPECT, BY_TOLERANCE, pair, worst)
+                    ints[leaves, WITNESS] = _witness(level, worst[5], body[pair[0], 1])
+                    leaves += 1
             else:
                 _push(stack, height, 2 * k + 1, level + 1, last, top)
                 _push(stack, height + 1, 2 * k, level + 1, last, top)

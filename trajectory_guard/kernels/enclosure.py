@@ -17,6 +17,11 @@ from trajectory_guard.kernels.chain import (
     place,
     turn,
 )
+from trajectory_guard.kernels.economised import (
+    control_points,
+    CONTROLS,
+    extend_economised,
+)
 from trajectory_guard.kernels.jit import kernel
 from trajectory_guard.kernels.margin import UP, chain_margin
 from trajectory_guard.kernels.piece import (
@@ -30,6 +35,10 @@ from trajectory_guard.kernels.piece import (
 
 LARGEST_DEGREE = 2 * FIT  # of one joint
 FROZEN = 2.0  # no turn moves a point by more than twice its distance from the axis
+
+# How the motion of a piece is built.
+RATIONAL = 0  # exact rational curves: audits, free bodies
+ECONOMISED = 1  # polynomials of degree 5: fast
 
 
 class Path(NamedTuple):
@@ -62,6 +71,7 @@ class Enclosure(NamedTuple):
     count (n,), kappa (n,), sound (n,): their number, column bound, and whether they are usable.
     needed (n,) bool: nodes with an open pair at or beyond them.
     power (16,), cosine, sine, weight (7,), scratch (K, 13): scratch.
+    powers (n, 12, 6), eps (n,), size (n,): polynomial poses, see ``economised``; column (12, 6): its scratch.
     """
 
     d: np.ndarray
@@ -82,17 +92,23 @@ class Enclosure(NamedTuple):
     sine: np.ndarray
     weight: np.ndarray
     scratch: np.ndarray
+    powers: np.ndarray
+    eps: np.ndarray
+    size: np.ndarray
+    column: np.ndarray
 
 
 @kernel
-def enclosure(nodes, longest):
+def enclosure(nodes, longest, builder):
     """
     Allocate the working arrays.
 
     :param nodes: number of nodes.
     :param longest: largest number of moving joints between the root and a node.
+    :param builder: RATIONAL or ECONOMISED.
     """
-    most = LARGEST_DEGREE * longest + 1
+    most = LARGEST_DEGREE * longest + 1 if builder == RATIONAL else 1
+    shown = most if builder == RATIONAL else CONTROLS
     width = LARGEST_DEGREE + 1
     return Enclosure(
         np.empty((nodes, TERMS)),
@@ -103,7 +119,7 @@ def enclosure(nodes, longest):
         np.empty((nodes, 1, POSE)),
         np.empty((nodes, 1, POSE)),
         np.empty((nodes, most, POSE + 1)),
-        np.empty((nodes, most, POSE)),
+        np.empty((nodes, shown, POSE)),
         np.zeros(nodes, np.int64),
         np.ones(nodes),
         np.zeros(nodes, np.bool_),
@@ -113,6 +129,10 @@ def enclosure(nodes, longest):
         np.empty(width),
         np.empty(width),
         np.empty((most, POSE + 1)),
+        np.empty((nodes, POSE, TERMS)),
+        np.zeros(nodes),
+        np.ones(nodes),
+        np.empty((POSE, TERMS)),
     )
 
 
@@ -135,23 +155,33 @@ def centre(chain, path, segment, m, h, e):
 
 
 @kernel
-def fit(chain, e):
-    """Fit the motion of every needed joint; see ``piece``."""
+def fit(chain, e, builder):
+    """Fit the motion of every needed joint; what it adds to an error per lever arm goes to ``e.fit``."""
     for j in range(len(chain.parent)):
         if e.needed[j]:
-            if e.span[j] == 0.0:
+            if builder == ECONOMISED:
+                extend_economised(
+                    chain, j, e.span, e.d, e.local, e.powers, e.fit, e.eps, e.size, e.kappa,
+                    e.column,
+                )
+            elif e.span[j] == 0.0:
                 e.fit[j] = 0.0
             elif chain.kind[j] == PRISMATIC:
                 e.fit[j] = fit_slide(e.d, j, e.power, e.fitted)
             else:
-                e.fit[j] = fit_half_angle(e.d, j, e.span[j], e.power, e.fitted)
+                e.fit[j] = min(fit_half_angle(e.d, j, e.span[j], e.power, e.fitted), FROZEN)
 
 
 @kernel
-def rational(chain, e):
+def build(chain, e, builder):
     """Write the control points of every needed node."""
     for j in range(len(chain.parent)):
-        if e.needed[j]:
+        if not e.needed[j]:
+            continue
+        if builder == ECONOMISED:
+            e.count[j] = CONTROLS
+            e.sound[j] = control_points(j, e.powers, e.points)
+        else:
             extend(
                 chain,
                 j,
@@ -166,7 +196,8 @@ def rational(chain, e):
                 e.sine,
                 e.weight,
             )
-            e.sound[j] = divide(j, e.controls, e.count, e.points) and e.kappa[j] < math.inf
+            e.sound[j] = divide(j, e.controls, e.count, e.points)
+        e.sound[j] = e.sound[j] and e.kappa[j] < math.inf
 
 
 @kernel
@@ -202,16 +233,13 @@ def displacement(chain, path, b, node, e):
 @kernel
 def fit_error(chain, path, b, node, e):
     """
-    Bound the distance between a body's true motion and its rational one.
+    Bound the distance between a body's true motion and the built one.
 
     :returns: the bound without tracking and without the rounding of the control points [m].
     """
     total = 0.0
     j = node
     while j >= 0:
-        off = e.fit[j]
-        if chain.kind[j] != PRISMATIC:
-            off = min(off, FROZEN)
-        total += (off + e.fuzz[j]) * path.rho[b, j]
+        total += (e.fit[j] + e.fuzz[j]) * path.rho[b, j]
         j = chain.parent[j]
     return total * UP

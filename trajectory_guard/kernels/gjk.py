@@ -14,6 +14,7 @@ from trajectory_guard.kernels.jit import kernel
 from trajectory_guard.kernels.separation import highest, lowest
 from trajectory_guard.kernels.solids import AXIS, CORE, DISC, FAR, FIRST, LAST
 
+RELATIVE = 0.02  # a direction this close to the best one is as good
 ROUNDS = 40  # enough for the distance of two polytopes; more is rounding
 SEPARATED = 0
 OVERLAP = 1
@@ -209,7 +210,8 @@ def gjk(nx, ny, nz, points, node, count, links, b, obstacles, o, want, accuracy,
     :param nx: first direction to try, from the obstacle towards the link, unit length.
     :param points: (n, K, 12) poses; the first ``count`` of ``node`` are used.
     :param want: stop as soon as a direction's support difference exceeds this [m].
-    :param accuracy: stop when distance and bound differ by less than this [m].
+    :param accuracy: stop when distance and bound differ by less than this and a fraction of the
+        distance [m].
     :param rounds: largest number of support points.
     :param s: (4, 6) scratch, simplex: differences and obstacle points.
     :param w: (4,) scratch.
@@ -231,7 +233,7 @@ def gjk(nx, ny, nz, points, node, count, links, b, obstacles, o, want, accuracy,
             out[3] = best
             if best > want:
                 return REACHED
-        if n > 0 and out[4] - best <= accuracy + 1e-10 * out[4]:
+        if n > 0 and out[4] - best <= accuracy + RELATIVE * out[4]:
             return SEPARATED
         _vertex(nx, ny, nz, points, node, i, links, b, obstacles, o, s, n)
         n += 1
@@ -267,6 +269,8 @@ def gjk(nx, ny, nz, points, node, count, links, b, obstacles, o, want, accuracy,
         out[7] = pz
         if n == 4 or length <= 1e-14 * (obstacles.size[o, FAR] + links.size[b, CORE]):
             return OVERLAP
+        if length <= want < math.inf:
+            return SEPARATED  # no direction can do it
         nx = x / length
         ny = y / length
         nz = z / length

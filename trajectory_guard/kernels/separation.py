@@ -186,3 +186,34 @@ def box_distance(x, y, z, solids, o):
         if outside > 0.0:
             total += outside * outside
     return math.sqrt(total)
+
+
+@kernel
+def box_direction(x, y, z, solids, o):
+    """
+    Propose the direction from the oriented box of a solid to a point outside it.
+
+    :returns: a unit vector; from the box's centre if the point is inside.
+    """
+    dx = x - solids.place[o, BOX + 3]
+    dy = y - solids.place[o, BOX + 7]
+    dz = z - solids.place[o, BOX + 11]
+    nx = ny = nz = 0.0
+    for k in range(3):
+        ax = solids.place[o, BOX + k]
+        ay = solids.place[o, BOX + 4 + k]
+        az = solids.place[o, BOX + 8 + k]
+        along = dx * ax + dy * ay + dz * az
+        half = solids.place[o, HALF + k]
+        outside = along - min(max(along, -half), half)
+        nx += outside * ax
+        ny += outside * ay
+        nz += outside * az
+    if nx == 0.0 and ny == 0.0 and nz == 0.0:
+        nx = dx
+        ny = dy
+        nz = dz
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if not length > 0.0:
+        return 0.0, 0.0, 1.0
+    return nx / length, ny / length, nz / length

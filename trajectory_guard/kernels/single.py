@@ -4,12 +4,13 @@ import numpy as np
 
 from trajectory_guard.kernels.chain import POSE
 from trajectory_guard.kernels.enclosure import (
+    build,
     centre,
     displacement,
     enclosure,
     fit,
     fit_error,
-    rational,
+    RATIONAL,
 )
 from trajectory_guard.kernels.jit import entry
 from trajectory_guard.kernels.margin import chain_margin
@@ -17,9 +18,9 @@ from trajectory_guard.kernels.solids import NODE
 
 
 @entry
-def link_motion(chain, links, path, body, segment, m, h):
+def link_motion(chain, links, path, body, segment, m, h, builder):
     """
-    Build the rational motion of one body on the piece s = m + h tau.
+    Build the motion of one body on the piece s = m + h tau.
 
     :param chain: :class:`~trajectory_guard.kernels.chain.Chain`.
     :param links: :class:`~trajectory_guard.kernels.solids.Solids` in node frames.
@@ -27,19 +28,21 @@ def link_motion(chain, links, path, body, segment, m, h):
     :param body: index of the body; it must hang on a node.
     :param segment: index of the segment.
     :param m: centre of the piece, h its half length, in [0, 1].
-    :returns: control matrices (K, 12), weights (K,), error of the motion without tracking, tracking
+    :param builder: ``enclosure.RATIONAL`` or ``ECONOMISED``.
+    :returns: control matrices (K, 12), scaled weights (K,) (economised: ones, the binomials
+        are the caller's), error of the motion without tracking, tracking
         inflation, largest displacement from the centre pose [m], and whether the motion is usable.
     """
     nodes = len(chain.parent)
-    e = enclosure(nodes, nodes)
+    e = enclosure(nodes, nodes, builder)
     node = links.index[body, NODE]
     j = node
     while j >= 0:
         e.needed[j] = True
         j = chain.parent[j]
     centre(chain, path, segment, m, h, e)
-    fit(chain, e)
-    rational(chain, e)
+    fit(chain, e, builder)
+    build(chain, e, builder)
     sweep, _, _, slack = displacement(chain, path, body, node, e)
     error = fit_error(chain, path, body, node, e) + chain_margin(
         float(chain.depth[node]), e.kappa[node], path.reach[body]
@@ -48,7 +51,7 @@ def link_motion(chain, links, path, body, segment, m, h):
     matrices = np.empty((count, POSE))
     weights = np.empty(count)
     for i in range(count):
-        weights[i] = e.controls[node, i, POSE]
+        weights[i] = e.controls[node, i, POSE] if builder == RATIONAL else 1.0
         for k in range(POSE):
             matrices[i, k] = e.points[node, i, k]
     return matrices, weights, error, slack, sweep, e.sound[node]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from trajectory_guard.kernels.enclosure import centre, enclosure
+from trajectory_guard.kernels.enclosure import centre, enclosure, RATIONAL
 from trajectory_guard.kernels.gjk import OVERLAP, ROUNDS, gjk
 from trajectory_guard.kernels.jit import entry
 from trajectory_guard.kernels.solids import BALL, NODE
@@ -23,7 +23,7 @@ def overlaps(chain, links, obstacles, path, pair_body, pair_obstacle):
     :returns: (Q,) bool.
     """
     nodes = len(chain.parent)
-    e = enclosure(nodes + 1, 0)
+    e = enclosure(nodes + 1, 0, RATIONAL)
     for j in range(nodes):
         e.needed[j] = True
     centre(chain, path, 0, 0.0, 1.0, e)
