@@ -49,9 +49,9 @@ def test_cosine_and_sine_lie_within_delta(span, degree):
         cosine, sine, delta = kernel_calls.fit_rotation(tuple(phi), float(np.abs(phi).sum()))
         for tau in (Fraction(k, 16) for k in range(-16, 17)):
             angle = ball(value(phi, tau))
-            square = (ball(value(cosine, tau)) - angle.cos()) ** 2 + (
-                ball(value(sine, tau)) - angle.sin()
-            ) ** 2
+            across = ball(value(cosine, tau)) - angle.cos()
+            along = ball(value(sine, tau)) - angle.sin()
+            square = across * across + along * along
             off = square.abs_upper().sqrt()
             assert off.upper() <= delta
             tightest = max(tightest, float(off) / delta)
