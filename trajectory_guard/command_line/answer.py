@@ -1,0 +1,85 @@
+"""From a request to the results, one per trajectory."""
+
+from collections.abc import Iterator, Mapping
+import dataclasses
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from trajectory_guard.certify import judge
+from trajectory_guard.command_line.options import Pose
+from trajectory_guard.command_line.request import Request, SELF_COLLISION_WARNING
+from trajectory_guard.command_line.sources import Selection, Source, sources
+from trajectory_guard.command_line.start import completed, depends_on_duration, without
+from trajectory_guard.errors import Reason, TrajectoryError
+from trajectory_guard.result import Result
+from trajectory_guard.robot import Robot
+from trajectory_guard.scene import load_scene
+from trajectory_guard.urdf import load_robot
+from trajectory_guard.workcell import Workcell
+
+UNMEASURED = (
+    'no joint state was recorded before this trajectory; --joint-states names the topic if it is '
+    'not /joint_states'
+)
+STAMPED = 'header.stamp is set; the motion was judged as if it began when the message arrives'
+APPROACH_UNKNOWN = (
+    'the curve to the first point depends on how long before the stamp the message arrived, so it '
+    'was not judged'
+)
+
+
+def answers(request: Request) -> Iterator[Result]:
+    """
+    Yield a result for every trajectory of a request, in order.
+
+    :param request: what to judge, against what.
+    :raises TrajectoryGuardError: robot, scene or start state cannot be used, so nothing can.
+    """
+    robot = load_robot(request.urdf)
+    _check_names(robot, request.start)
+    workcell = Workcell(robot, load_scene(request.scenes, _matrix(request.scene_pose)))
+    selection = Selection(request.topics, request.joint_state_topics)
+    for path in request.paths:
+        for source in sources(path, selection, request.bags_only):
+            yield _answer(source, workcell, request)
+
+
+def _answer(source: Source, workcell: Workcell, request: Request) -> Result:
+    """Return the result of one source."""
+    if isinstance(source.trajectory, TrajectoryError):
+        return Result.rejected(source.trajectory, request.settings, source.name)
+    start = completed(source.start, request.start)
+    warnings = [UNMEASURED] if source.recorded and source.start is None else []
+    if source.stamp_ns:
+        warnings.append(STAMPED)
+        if depends_on_duration(source.trajectory, start):
+            warnings.append(APPROACH_UNKNOWN)
+            start = without(start, source.trajectory.joint_names)
+    if request.self_collision:
+        warnings.append(SELF_COLLISION_WARNING)
+    result = judge(workcell, source.trajectory, start, request.settings)
+    return dataclasses.replace(result, warnings=(*result.warnings, *warnings))
+
+
+def _check_names(robot: Robot, start: Mapping[str, float]) -> None:
+    """Refuse joints of ``--start`` that the robot does not have: they would say nothing."""
+    movable = [joint.name for joint in robot.movable]
+    for name in start:
+        if name not in movable:
+            raise TrajectoryError(
+                Reason.UNKNOWN_JOINT,
+                f"Invalid value for '--start': the robot has no movable joint {name!r}; it has "
+                f'{", ".join(movable)}',
+            )
+
+
+def _matrix(pose: Pose | None) -> np.ndarray | None:
+    """Return a pose as (4, 4) matrix."""
+    if pose is None:
+        return None
+    T = np.eye(4)
+    T[:3, 3] = pose.xyz
+    # Lower case: about the fixed axes, as in URDF.
+    T[:3, :3] = Rotation.from_euler('xyz', pose.rpy).as_matrix()
+    return T

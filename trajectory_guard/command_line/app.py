@@ -1,0 +1,117 @@
+"""The commands ``check`` and ``replay``."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from trajectory_guard.command_line import options
+from trajectory_guard.command_line.request import Request
+from trajectory_guard.command_line.run import run
+from trajectory_guard.settings import Settings
+
+_DEFAULTS = Settings()
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    # Plain text: boxes break messages in the middle of a path.
+    rich_markup_mode=None,
+)
+
+
+@app.callback()
+def main() -> None:
+    """
+    Prove where the motion that a controller plays is free of collisions.
+
+    Exit codes: 0 all free, 1 something is not free, 2 bad input, 3 internal error.
+    """
+
+
+@app.command()
+def check(
+    trajectories: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar='TRAJECTORY',
+            help='JointTrajectory as YAML or JSON (`ros2 topic echo --full-length`), or a bag.',
+        ),
+    ],
+    urdf: options.Urdf,
+    scene: options.Scenes,
+    scene_pose: options.ScenePose = None,
+    tolerance: options.Tolerance = _DEFAULTS.tolerance,
+    clearance: options.Clearance = _DEFAULTS.clearance,
+    tracking_tolerance: options.TrackingTolerance = _DEFAULTS.tracking_tolerance[0],
+    start: options.Start = None,
+    no_self_collision: options.NoSelfCollision = False,
+    no_joint_limits: options.NoJointLimits = False,
+    allow_end_velocity: options.AllowEndVelocity = False,
+    deadline: options.Deadline = None,
+    json: options.Json = False,
+) -> None:
+    """Certify trajectories from files; of a bag, what `replay` would take."""
+    settings = Settings(
+        tolerance=tolerance,
+        clearance=clearance,
+        tracking_tolerance=(tracking_tolerance,),
+        deadline_ns=deadline,
+        check_joint_limits=not no_joint_limits,
+        allow_nonzero_end_velocity=allow_end_velocity,
+    )
+    request = Request(
+        urdf=urdf,
+        scenes=scene,
+        scene_pose=scene_pose,
+        settings=settings,
+        start=start or {},
+        paths=trajectories,
+        self_collision=not no_self_collision,
+    )
+    raise typer.Exit(run(request, json=json))
+
+
+@app.command()
+def replay(
+    bags: Annotated[
+        list[Path], typer.Argument(metavar='BAG', help='Folder of a bag, or .mcap or .db3 file.')
+    ],
+    urdf: options.Urdf,
+    scene: options.Scenes,
+    topic: options.Topics = None,
+    joint_states: options.JointStates = None,
+    scene_pose: options.ScenePose = None,
+    tolerance: options.Tolerance = _DEFAULTS.tolerance,
+    clearance: options.Clearance = _DEFAULTS.clearance,
+    tracking_tolerance: options.TrackingTolerance = _DEFAULTS.tracking_tolerance[0],
+    start: options.Start = None,
+    no_self_collision: options.NoSelfCollision = False,
+    no_joint_limits: options.NoJointLimits = False,
+    allow_end_velocity: options.AllowEndVelocity = False,
+    deadline: options.Deadline = None,
+    json: options.Json = False,
+) -> None:
+    """Certify recorded trajectories, each from the joint state measured last before it."""
+    settings = Settings(
+        tolerance=tolerance,
+        clearance=clearance,
+        tracking_tolerance=(tracking_tolerance,),
+        deadline_ns=deadline,
+        check_joint_limits=not no_joint_limits,
+        allow_nonzero_end_velocity=allow_end_velocity,
+    )
+    request = Request(
+        urdf=urdf,
+        scenes=scene,
+        scene_pose=scene_pose,
+        settings=settings,
+        start=start or {},
+        paths=bags,
+        topics=topic or (),
+        joint_state_topics=joint_states or (),
+        bags_only=True,
+        self_collision=not no_self_collision,
+    )
+    raise typer.Exit(run(request, json=json))
