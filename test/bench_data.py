@@ -32,7 +32,9 @@ def cases(robot):
                 data['joint_names'],
                 [
                     Point(round(1e9 * t), p, v)
-                    for t, p, v in zip(case['times'], case['positions'], case['velocities'])
+                    for t, p, v in zip(
+                        case['times'], case['positions'], case['velocities'], strict=True
+                    )
                 ],
                 name=f'{robot}-{n}',
             ),

@@ -17,7 +17,9 @@ class Judge:
             for body in cell.robot.bodies(link)
         ]
         self.obstacles = [
-            (obstacle.name, shape(body)) for obstacle in cell.scene.obstacles for body in obstacle.bodies
+            (obstacle.name, shape(body))
+            for obstacle in cell.scene.obstacles
+            for body in obstacle.bodies
         ]
         self.request = coal.DistanceRequest()
         self.request.gjk_tolerance = 1e-10
@@ -38,7 +40,9 @@ class Judge:
             placed = coal.Transform3s(pose[:3, :3], pose[:3, 3])
             for _, (second, other, margin) in self.obstacles:
                 fixed = coal.Transform3s(other[:3, :3], other[:3, 3])
-                d = coal.distance(first, placed, second, fixed, self.request, coal.DistanceResult())
+                d = coal.distance(
+                    first, placed, second, fixed, self.request, coal.DistanceResult()
+                )
                 best = min(best, d - ball - margin)
         return best
 

@@ -95,9 +95,7 @@ def random_robot(rng, joints=5, scale=1.0):
                 mimic,
             )
         )
-        collisions[f'l{j + 1}'] = (
-            Collision(np.eye(4), Given(random_body(rng, 0.1 * scale))),
-        )
+        collisions[f'l{j + 1}'] = (Collision(np.eye(4), Given(random_body(rng, 0.1 * scale))),)
     return Robot('random', 'l0', tuple(made), collisions, b'')
 
 
@@ -138,7 +136,7 @@ def random_workcell(rng, joints=5, scale=1.0):
 
 def link_poses(robot, q):
     """Return the pose of every link, (4, 4), computed joint by joint with scipy's rotations."""
-    positions = dict(zip((joint.name for joint in robot.movable), q))
+    positions = dict(zip((joint.name for joint in robot.movable), q, strict=True))
     T = {robot.root: np.eye(4)}
     for joint in robot.joints:
         motion = np.eye(4)
@@ -157,6 +155,4 @@ def core(body, rng, count=30):
         return body.vertices
     across = np.cross(body.disc_axis, rng.normal(size=(count, 3)))
     across /= np.linalg.norm(across, axis=1)[:, None]
-    return np.concatenate(
-        [body.vertices, *(v + body.disc_radius * across for v in body.vertices)]
-    )
+    return np.concatenate([body.vertices, *(v + body.disc_radius * across for v in body.vertices)])

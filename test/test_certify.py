@@ -1,6 +1,7 @@
 """The guarantee: free means free, at every instant, for every deviation, at every scale."""
 
 import dataclasses
+from itertools import pairwise
 import math
 
 from bench_data import cases, ROBOTS, SETTINGS, workcell
@@ -30,7 +31,7 @@ def assert_partition(result):
     """Check that the intervals meet and cover [0, duration]."""
     assert result.intervals[0].start_ns == 0
     assert result.intervals[-1].end_ns == result.duration_ns
-    for a, b in zip(result.intervals, result.intervals[1:]):
+    for a, b in pairwise(result.intervals):
         assert a.end_ns == b.start_ns
 
 
@@ -81,7 +82,7 @@ def test_permuted_joints_give_the_same_answer(robot):
             [
                 Point(int(t), p[order], v[order])
                 for t, p, v in zip(
-                    trajectory.times_ns, trajectory.positions, trajectory.velocities
+                    trajectory.times_ns, trajectory.positions, trajectory.velocities, strict=True
                 )
             ],
         )
@@ -91,8 +92,10 @@ def test_permuted_joints_give_the_same_answer(robot):
 
 def sampled_free(cell, path, result, slack, rng, count, oracle):
     """Check random in-tube configurations at random instants of free intervals against coal."""
-    free = [row for row in result.intervals if row.status == Status.FREE and row.end_ns > row.start_ns]
-    links = {cell.link_names[b] for b in cell.pairs(path.in_path).body}
+    free = [
+        row for row in result.intervals if row.status == Status.FREE and row.end_ns > row.start_ns
+    ]
+    links = {cell.link_names[b] for b in cell.pairs(path.in_path).checked[:, 0]}
     checked = 0
     for _ in range(count if free else 0):
         row = free[rng.integers(len(free))]
@@ -167,7 +170,9 @@ def test_free_is_free_on_real_robots_many(robot):
     for tolerance in (0.0, 0.01):
         settings = dataclasses.replace(SETTINGS, tracking_tolerance=(tolerance,))
         for trajectory, _, _ in cases(robot):
-            path = joint_path(cell.robot.movable, trajectory, None, allow_nonzero_end_velocity=True)
+            path = joint_path(
+                cell.robot.movable, trajectory, None, allow_nonzero_end_velocity=True
+            )
             result = certify(cell, path, settings)
             slack = np.full(len(path.joint_names), tolerance)
             sampled_free(cell, path, result, slack, rng, 100, oracle)
@@ -183,8 +188,14 @@ def slider(scale=1.0, wall=3.0, depth=1.0, body=None):
         'base',
         (
             Joint(
-                'slide', JointType.PRISMATIC, 'base', 'cube', np.eye(4), np.array([1.0, 0, 0]),
-                -math.inf, math.inf,
+                'slide',
+                JointType.PRISMATIC,
+                'base',
+                'cube',
+                np.eye(4),
+                np.array([1.0, 0, 0]),
+                -math.inf,
+                math.inf,
             ),
         ),
         {'cube': (Collision(np.eye(4), Given(body or box_body(np.full(3, scale)))),)},
@@ -207,9 +218,7 @@ def slide(*stops, seconds=1.0):
 def test_contact_time_is_exact_at_every_scale(scale):
     """From micrometres to kilometres the free interval ends just before the known contact."""
     tolerance = max(1e-4 * scale, 1e-9)
-    result = judge(
-        slider(scale), slide(0.0, 5.0 * scale), None, Settings(tolerance=tolerance)
-    )
+    result = judge(slider(scale), slide(0.0, 5.0 * scale), None, Settings(tolerance=tolerance))
     contact = 0.5 * SECOND  # at x = 2.5 the front face reaches the wall
     last = 0.9 * SECOND  # at x = 4.5 the back face leaves it
     free, rest = result.intervals[0], result.intervals[1:]
@@ -222,7 +231,9 @@ def test_contact_time_is_exact_at_every_scale(scale):
     collision = [row for row in rest if row.status == Status.COLLISION]
     assert min(row.start_ns for row in collision) >= contact
     assert max(row.end_ns for row in collision) <= last
-    assert sum(row.end_ns - row.start_ns for row in collision) > 0.99 * (last - contact) - 2 * slack
+    assert (
+        sum(row.end_ns - row.start_ns for row in collision) > 0.99 * (last - contact) - 2 * slack
+    )
     at = collision[0]
     assert at.gap_upper < 0.0
     assert at.start_ns <= at.at_ns <= at.end_ns
@@ -318,7 +329,9 @@ def test_deadline_stops_a_long_search():
     cell = slider(body=ConvexBody(box_body(np.ones(3)).vertices))
     # In contact without known faces: cut down to the tolerance everywhere, a million pieces.
     long = slide(0.0, *np.tile([2.0, 3.2], 200), seconds=0.1)
-    result = judge(cell, long, None, Settings(tolerance=1e-9, deadline_ns=50_000_000, max_pieces=10**9))
+    result = judge(
+        cell, long, None, Settings(tolerance=1e-9, deadline_ns=50_000_000, max_pieces=10**9)
+    )
     assert result.intervals[0].status == Status.FREE
     assert result.intervals[-1].reason == Reason.DEADLINE.value
     assert_partition(result)
@@ -354,8 +367,14 @@ def test_a_thousand_turns_far_away_cost_nothing():
         'base',
         (
             Joint(
-                'spin', JointType.CONTINUOUS, 'base', 'blade', np.eye(4), np.array([0, 0, 1.0]),
-                -math.inf, math.inf,
+                'spin',
+                JointType.CONTINUOUS,
+                'base',
+                'blade',
+                np.eye(4),
+                np.array([0, 0, 1.0]),
+                -math.inf,
+                math.inf,
             ),
         ),
         {'blade': (Collision(np.eye(4), Given(box_body(np.array([1.0, 0.1, 0.1])))),)},
@@ -405,7 +424,7 @@ def test_tracking_tolerance_per_joint_and_wrong_counts():
     values = tuple(0.001 * k for k in range(6))
     reverse = tuple(reversed(trajectory.joint_names))
     slack = tracking_slack(cell.robot.movable, path, reverse, Settings(tracking_tolerance=values))
-    by_name = dict(zip(path.joint_names, slack))
+    by_name = dict(zip(path.joint_names, slack, strict=True))
     assert [by_name[name] for name in reverse] == list(values)
 
 
@@ -424,9 +443,7 @@ def test_what_the_verdict_does_not_cover_is_said():
     """Static pairs and self-collision are listed; a static overlap is a warning."""
     base = {'base': (Collision(np.eye(4), Given(box_body(np.ones(3), (3.0, 0, 0)))),)}
     cell = slider()
-    robot = dataclasses.replace(
-        cell.robot, collisions={**base, **cell.robot.collisions}
-    )
+    robot = dataclasses.replace(cell.robot, collisions={**base, **cell.robot.collisions})
     result = judge(Workcell(robot, cell.scene), slide(0.0, 1.0))
     assert result.verdict == Verdict.FREE
     assert any('base' in line for line in result.unchecked_pairs)

@@ -39,14 +39,26 @@ def run(points, links, obstacles):
     """Return state and output of the distance search."""
     s, w, out = np.empty((4, 6)), np.empty(4), np.empty(8)
     state = kernel_calls.gjk(
-        np.array([0.0, 0.0, 1.0]), points, 1, links, 0, obstacles, 0, math.inf, 1e-9, ROUNDS, s, w, out
+        np.array([0.0, 0.0, 1.0]),
+        points,
+        1,
+        links,
+        0,
+        obstacles,
+        0,
+        math.inf,
+        1e-9,
+        ROUNDS,
+        s,
+        w,
+        out,
     )
     return state, out
 
 
 @pytest.mark.parametrize('apart', [0.5, 3.0, 4.0, 10.0])
 def test_distance_and_direction_agree_with_coal(apart):
-    """coal's distance lies between the direction's support difference and the nearest points."""
+    """Coal's distance lies between the direction's support difference and the nearest points."""
     rng = np.random.default_rng(int(10 * apart))
     request = coal.DistanceRequest()
     request.gjk_tolerance = 1e-10
@@ -55,8 +67,12 @@ def test_distance_and_direction_agree_with_coal(apart):
         P = points.reshape(3, 4)
         result = coal.DistanceResult()
         d = coal.distance(
-            hull_of(a), coal.Transform3s(P[:, :3], P[:, 3]), hull_of(b), coal.Transform3s(),
-            request, result,
+            hull_of(a),
+            coal.Transform3s(P[:, :3], P[:, 3]),
+            hull_of(b),
+            coal.Transform3s(),
+            request,
+            result,
         )
         state, out = run(points, links, obstacles)
         if d > 1e-6:
@@ -72,11 +88,20 @@ def test_common_point_is_deep_in_both():
     rng = np.random.default_rng(3)
     found = 0
     for _ in range(60):
-        a, b, points, links, obstacles = scene(rng, 1.5)
+        a, _, points, links, obstacles = scene(rng, 1.5)
         out = np.empty(6)
         inside = kernel_calls.deepest(
-            points, links, 0, obstacles, 0, np.empty((4, 4)), np.empty(4), np.empty((4, 8)),
-            np.empty(4), np.empty((200, 4)), out,
+            points,
+            links,
+            0,
+            obstacles,
+            0,
+            np.empty((4, 4)),
+            np.empty(4),
+            np.empty((4, 8)),
+            np.empty(4),
+            np.empty((200, 4)),
+            out,
         )
         state, _ = run(points, links, obstacles)
         assert inside == (state == OVERLAP)
@@ -98,9 +123,18 @@ def test_no_faces_no_claim():
     body = box_body(np.ones(3))
     links, obstacles = solids([body], [0]), solids([body], [-1])
     points = np.array([[[1.0, 0, 0, 0, 0, 1.0, 0, 0, 0, 0, 1.0, 0]]])
-    bare = links._replace(index=links.index * np.array([1, 1, 0, 0, 1]))
+    bare = links._replace(ranges=links.ranges * np.array([1, 1, 0, 0, 1]))
     out = np.empty(6)
     assert not kernel_calls.deepest(
-        points, bare, 0, obstacles, 0, np.empty((4, 4)), np.empty(4), np.empty((4, 8)),
-        np.empty(4), np.empty((200, 4)), out,
+        points,
+        bare,
+        0,
+        obstacles,
+        0,
+        np.empty((4, 4)),
+        np.empty(4),
+        np.empty((4, 8)),
+        np.empty(4),
+        np.empty((200, 4)),
+        out,
     )

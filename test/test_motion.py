@@ -40,9 +40,7 @@ def test_bound_contains_pinocchio_on_real_robots(robot, builder):
         for segment, numerator, level in pieces(rng, 12, len(path.coefficients), 5):
             body = int(rng.choice(np.flatnonzero(cell.link_nodes >= 0)))
             link = cell.link_names[body]
-            motion = rational_motion(
-                cell, path, body, segment, numerator, level, builder=builder
-            )
+            motion = rational_motion(cell, path, body, segment, numerator, level, builder=builder)
             for tau in np.linspace(-1.0, 1.0, 9):
                 s = place(level, numerator, tau)
                 q = (path.coefficients[segment] * s ** np.arange(6)).sum(axis=1)
@@ -101,9 +99,7 @@ def test_true_points_lie_in_the_hull_of_the_control_points(builder):
     for segment, numerator, level in pieces(rng, 30, len(path.coefficients), 4):
         body = int(rng.choice(np.flatnonzero(cell.link_nodes >= 0)))
         link = cell.link_names[body]
-        motion = rational_motion(
-            cell, path, body, segment, numerator, level, builder=builder
-        )
+        motion = rational_motion(cell, path, body, segment, numerator, level, builder=builder)
         assert (motion.weights > 0.0).all()
         x = cell.robot.bodies(link)[0].vertices[0]
         local = cell.tree.link_pose[link] @ [*x, 1.0]

@@ -37,10 +37,7 @@ def exact_gap(n, points, body, obstacle):
     rows = [[Fraction(float(x)) for x in row] for row in points[0]]
     low = min(
         sum(
-            n[r]
-            * (
-                sum(row[4 * r + c] * Fraction(float(v[c])) for c in range(3)) + row[4 * r + 3]
-            )
+            n[r] * (sum(row[4 * r + c] * Fraction(float(v[c])) for c in range(3)) + row[4 * r + 3])
             for r in range(3)
         )
         for row in rows
@@ -61,9 +58,7 @@ def test_bound_is_below_the_exact_value(scale):
         points = controls(rng, 5, scale)
         n = unit(rng)
         reach = float(links.size[0, FAR] + np.abs(points[0, :, 3::4]).sum(axis=1).max())
-        gap = kernel_calls.separation(
-            *n, points, 0, 5, links, 0, obstacles, 0, 0.0, 2.0, reach
-        )
+        gap = kernel_calls.separation(*n, points, 0, 5, links, 0, obstacles, 0, 0.0, 2.0, reach)
         exact = exact_gap(n, points, body, obstacle)
         length = math.sqrt(float(sum(Fraction(float(x)) ** 2 for x in n)))
         assert Fraction(gap) <= exact / Fraction(length)
@@ -85,7 +80,9 @@ def test_bound_is_below_sampled_supports():
         )
         high = (core(obstacle, rng) @ n).max()
         assert gap <= low - body.ball - high - obstacle.ball - 0.01
-        assert gap >= low - body.ball - high - obstacle.ball - 0.01 - 0.06  # rim samples are coarse
+        assert (
+            gap >= low - body.ball - high - obstacle.ball - 0.01 - 0.06
+        )  # rim samples are coarse
 
 
 @pytest.mark.parametrize('bad', [np.nan, np.inf])
@@ -147,13 +144,15 @@ def test_box_and_sphere_contain_the_core(seed):
     for scale in (1e-6, 1.0, 1e6):
         body = random_body(rng, scale)
         packed = solids([body], [-1])
-        assert packed.index[0, LAST] - packed.index[0, FIRST] == len(body.vertices)
+        assert packed.ranges[0, LAST] - packed.ranges[0, FIRST] == len(body.vertices)
         points = core(body, rng)
         for x in points:
             # A rim sample is off by its own rounding.
             assert kernel_calls.box_distance(*x, packed, 0) <= 1e-14 * scale
         tolerance = 1.0 + 1e-14
-        assert np.linalg.norm(points - body.center, axis=1).max() <= packed.size[0, CORE] * tolerance
+        assert (
+            np.linalg.norm(points - body.center, axis=1).max() <= packed.size[0, CORE] * tolerance
+        )
         assert np.linalg.norm(points, axis=1).max() <= packed.size[0, FAR] * tolerance
 
 

@@ -1,4 +1,4 @@
-"""The verb: is the motion that a joint path describes clear of the scene at every instant?"""
+"""The verb: prove a joint path clear of the scene at every instant, or say where it is not."""
 
 from collections.abc import Sequence
 import dataclasses
@@ -9,13 +9,12 @@ import time
 import numpy as np
 
 from trajectory_guard.errors import Reason, TrajectoryGuardError
-from trajectory_guard.joint_path import INTERPOLATION, JointPath, joint_path
+from trajectory_guard.joint_path import INTERPOLATION, joint_path, JointPath
 from trajectory_guard.kernels.cover import cover
-from trajectory_guard.kernels.enclosure import ECONOMISED
-from trajectory_guard.kernels.enclosure import Path
+from trajectory_guard.kernels.enclosure import ECONOMISED, Path
 from trajectory_guard.kernels.still import overlaps
-from trajectory_guard.request import motion_path, tracking_slack
-from trajectory_guard.result import NANOSECONDS, Interval, Result, Status, Verdict
+from trajectory_guard.request import check_joints, motion_path, tracking_slack
+from trajectory_guard.result import Interval, NANOSECONDS, Result, Status, Verdict
 from trajectory_guard.settings import Settings
 from trajectory_guard.timeline import intervals
 from trajectory_guard.trajectory import JointState, Trajectory
@@ -43,6 +42,7 @@ def certify(
     """
     settings = settings or Settings()
     begin = time.perf_counter()
+    check_joints(workcell.robot.movable, path)
     if slack is None:
         slack = tracking_slack(workcell.robot.movable, path, (), settings)
     pairs = workcell.pairs(path.in_path)
@@ -55,8 +55,7 @@ def certify(
             workcell.links,
             workcell.obstacles,
             motion,
-            pairs.body,
-            pairs.obstacle,
+            pairs.checked,
             settings.tolerance,
             settings.clearance,
             settings.max_pieces,
@@ -87,7 +86,7 @@ def certify(
         scene_hash=workcell.scene_hash,
         compute_time=time.perf_counter() - begin,
         pieces=int(pieces),
-        pairs_checked=pairs.checked,
+        pairs_checked=pairs.count,
         unchecked_pairs=pairs.unchecked,
         warnings=_warnings(workcell, motion, pairs, path),
         duration_ns=path.duration_ns,
@@ -173,14 +172,13 @@ def _warnings(workcell: Workcell, motion: Path, pairs: Pairs, path: JointPath) -
         workcell.links,
         workcell.obstacles,
         motion,
-        pairs.still_body,
-        pairs.still_obstacle,
+        pairs.still,
     )
     names = sorted(
         {
             (
-                workcell.link_names[pairs.still_body[i]],
-                workcell.obstacle_names[pairs.still_obstacle[i]],
+                workcell.link_names[pairs.still[i, 0]],
+                workcell.obstacle_names[pairs.still[i, 1]],
             )
             for i in np.flatnonzero(touching)
         }

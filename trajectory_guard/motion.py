@@ -10,7 +10,7 @@ from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.joint_path import JointPath
 from trajectory_guard.kernels import enclosure
 from trajectory_guard.kernels.single import link_motion
-from trajectory_guard.request import motion_path
+from trajectory_guard.request import check_joints, motion_path
 from trajectory_guard.workcell import Workcell
 
 
@@ -26,10 +26,11 @@ class RationalMotion:
     """
     A curve of affine displacements, degree K - 1 in tau in [-1, 1].
 
-    The image of a point x at tau lies within ``error`` of ``pose(tau)`` applied to x, for every x of the core
-    (vertices and disc) of the body the motion was built for; its ball looks the same from every side.
-    With the joints off by their tracking tolerance it is ``error + inflation``.  All weights are positive, so it also lies that close to the convex hull of
-    the control points applied to x [Schroecker & Weber 2014, sec. 5].
+    The image of a point x at tau lies within ``error`` of ``pose(tau)`` applied to x, for every x
+    of the core (vertices and disc) of the body the motion was built for; its ball looks the same
+    from every side. With the joints off by their tracking tolerance it is ``error + inflation``.
+    All weights are positive, so it also lies that close to the convex hull of the control points
+    applied to x [Schroecker & Weber 2014, sec. 5].
 
     :param control_points: (K, 3, 4) poses of the body's node frame in the root frame [m].
     :param weights: (K,) positive Bernstein weights, binomials included.
@@ -79,8 +80,8 @@ def rational_motion(
     :param level: its power of two.
     :param slack: (n,) tracking tolerance per movable joint; none if None.
     :param builder: how; an economised motion is a polynomial, its weights are the binomials.
-    :raises RequestError: the piece does not exist, the body does not move, or the joints turn too far
-        in the piece for positive weights.
+    :raises RequestError: the path is another robot's, the piece does not exist, the body does not move, or the joints turn too
+        far in the piece for positive weights.
     """
     if not (0 <= segment < len(path.coefficients) and 0 <= numerator < 2**level <= 2**48):
         raise RequestError(
@@ -88,6 +89,7 @@ def rational_motion(
         )
     if not (0 <= body < len(workcell.link_names) and workcell.link_nodes[body] >= 0):
         raise RequestError(Reason.INVALID_PARAMETER, f'body {body} hangs on no movable joint')
+    check_joints(workcell.robot.movable, path)
     half = 0.5 ** (level + 1)
     matrices, weights, error, inflation, sweep, sound = link_motion(
         workcell.tree.chain,

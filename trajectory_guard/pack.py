@@ -21,7 +21,7 @@ def solids(bodies: Sequence[ConvexBody], nodes: Sequence[int]) -> Solids:
     """
     ends = np.cumsum([len(body.vertices) for body in bodies])
     face_ends = np.cumsum([len(body.faces) for body in bodies])
-    index = np.column_stack(
+    ranges = np.column_stack(
         [
             ends - [len(body.vertices) for body in bodies],
             ends,
@@ -41,7 +41,7 @@ def solids(bodies: Sequence[ConvexBody], nodes: Sequence[int]) -> Solids:
     ]
     place = [np.concatenate([body.disc_axis, body.center, *_box(body)]) for body in bodies]
     return Solids(
-        index=index.astype(np.int64),
+        ranges=ranges.astype(np.int64),
         size=np.array(size),
         place=np.array(place),
         vertices=np.ascontiguousarray(np.concatenate([body.vertices for body in bodies]).T),
@@ -83,7 +83,7 @@ def _box(body: ConvexBody) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _frames(body: ConvexBody) -> list[np.ndarray]:
-    """Return candidate rotations (columns are the box axes): the frame's own, pairs of faces, inertia."""
+    """Return candidate rotations, columns the axes: the frame, pairs of faces, inertia."""
     frames = [np.eye(3)]
     normals = body.faces[:FACES_TRIED, :3]
     for i, n in enumerate(normals):

@@ -17,6 +17,22 @@ from trajectory_guard.workcell import Workcell
 LARGEST = 1e9
 
 
+def check_joints(movable: Sequence[Joint], path: JointPath) -> None:
+    """
+    Refuse a path that was made for other joints.
+
+    :param movable: the robot's movable joints.
+    :param path: the joint path.
+    :raises RequestError: the joints differ; the message lists both.
+    """
+    names = tuple(joint.name for joint in movable)
+    if path.joint_names != names:
+        raise RequestError(
+            Reason.INVALID_PARAMETER,
+            f'the path has joints {path.joint_names}, the robot {names}',
+        )
+
+
 def tracking_slack(
     movable: Sequence[Joint], path: JointPath, commanded: Sequence[str], settings: Settings
 ) -> np.ndarray:
@@ -40,12 +56,14 @@ def tracking_slack(
         )
     if len(values) == 1:
         named = {
-            joint.name: values[0] for joint, inside in zip(movable, path.in_path) if inside
+            joint.name: values[0]
+            for joint, inside in zip(movable, path.in_path, strict=True)
+            if inside
         }
     else:
-        named = dict(zip(commanded, values))
+        named = dict(zip(commanded, values, strict=True))
     slack = np.zeros(len(movable))
-    for j, (joint, inside) in enumerate(zip(movable, path.in_path)):
+    for j, (joint, inside) in enumerate(zip(movable, path.in_path, strict=True)):
         if not inside:
             continue
         factor = 1.0
@@ -64,14 +82,8 @@ def motion_path(workcell: Workcell, path: JointPath, slack: np.ndarray) -> Path:
     :param workcell: robot and scene.
     :param path: the motion of every movable joint of that robot.
     :param slack: (n,) tracking tolerance per movable joint [rad or m].
-    :raises RequestError: the path is another robot's, or leaves the range of the kernels.
+    :raises RequestError: the path leaves the range of the kernels.
     """
-    if path.joint_names != tuple(joint.name for joint in workcell.robot.movable):
-        raise RequestError(
-            Reason.INVALID_PARAMETER,
-            f'the path has joints {path.joint_names}, the robot '
-            f'{tuple(joint.name for joint in workcell.robot.movable)}',
-        )
     size = np.abs(path.coefficients).sum(axis=2).max(axis=0) + path.coefficient_error.max(axis=0)
     if not (np.isfinite(size).all() and (size <= LARGEST).all() and np.isfinite(slack).all()):
         worst = int(np.argmax(~(size <= LARGEST)))

@@ -2,24 +2,25 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 import math
 
 import numpy as np
 
 from trajectory_guard.errors import Reason
-from trajectory_guard.kernels import cover
+from trajectory_guard.kernels import leaf as leaves
 from trajectory_guard.result import Interval, Status
 
 _STATUS = {
-    cover.FREE: Status.FREE,
-    cover.SUSPECT: Status.SUSPECT,
-    cover.COLLISION: Status.COLLISION,
+    leaves.FREE: Status.FREE,
+    leaves.SUSPECT: Status.SUSPECT,
+    leaves.COLLISION: Status.COLLISION,
 }
 _REASON = {
-    cover.BY_TOLERANCE: Reason.TOLERANCE,
-    cover.BY_DEPTH: Reason.DEPTH,
-    cover.BY_BUDGET: Reason.BUDGET,
-    cover.BY_STOP: Reason.DEADLINE,
+    leaves.BY_TOLERANCE: Reason.TOLERANCE,
+    leaves.BY_DEPTH: Reason.DEPTH,
+    leaves.BY_BUDGET: Reason.BUDGET,
+    leaves.BY_STOP: Reason.DEADLINE,
 }
 
 
@@ -65,8 +66,8 @@ def intervals(
     interval.  The ends of neighbours stay equal.
 
     :param knots_ns: (S + 1,) segment ends [ns].
-    :param ints: (L, 9) leaves in time order, see ``kernels.cover``.
-    :param floats: (L, 5) their gap bounds and places.
+    :param ints: (L, 9) leaves in time order, see ``kernels.leaf``.
+    :param floats: (L, 7) their gap bounds and places.
     :param link_names: name of the link of each packed body.
     :param obstacle_names: name of each packed obstacle.
     :param unknown_until_ns: end of the leading span without a start state [ns].
@@ -79,20 +80,20 @@ def intervals(
     ints, floats = _with_witnesses(ints, floats)
     cuts = (
         np.flatnonzero(
-            (np.diff(ints[:, cover.STATUS]) != 0) | (np.diff(ints[:, cover.REASON]) != 0)
+            (np.diff(ints[:, leaves.STATUS]) != 0) | (np.diff(ints[:, leaves.REASON]) != 0)
         )
         + 1
     )
     firsts = [0, *cuts.tolist()]
     lasts = [*cuts.tolist(), len(ints)]
     start_ns = int(knots_ns[0])
-    for g, (first, last) in enumerate(zip(firsts, lasts)):
+    for g, (first, last) in enumerate(zip(firsts, lasts, strict=True)):
         row = _merged(knots_ns, ints[first:last], floats[first:last], link_names, obstacle_names)
         if g + 1 < len(firsts):
             end_ns = _boundary(
                 row.status,
-                _STATUS[int(ints[last, cover.STATUS])],
-                _instant(knots_ns, ints[last], cover.START),
+                _STATUS[int(ints[last, leaves.STATUS])],
+                _instant(knots_ns, ints[last], leaves.START),
             )
         else:
             end_ns = int(knots_ns[-1])
@@ -108,27 +109,27 @@ def _with_witnesses(ints: np.ndarray, floats: np.ndarray) -> tuple[np.ndarray, n
     """
     Cut the proved collision out of runs of suspect leaves that contain no other.
 
-    A graze shallower than the tolerance is settled before any whole piece of it is proved to collide,
-    but the middle of a leaf may be; the widest such middle stands for the run.
+    A graze shallower than the tolerance is settled before any whole piece of it is proved to
+    collide, but the middle of a leaf may be; the widest such middle stands for the run.
     """
-    changes = np.flatnonzero(np.diff(ints[:, cover.STATUS] == cover.FREE)) + 1
+    changes = np.flatnonzero(np.diff(ints[:, leaves.STATUS] == leaves.FREE)) + 1
     bounds = [0, *changes.tolist(), len(ints)]
     pieces_i, pieces_f, done = [], [], 0
-    for first, last in zip(bounds, bounds[1:]):
+    for first, last in pairwise(bounds):
         run = ints[first:last]
-        known = np.flatnonzero(run[:, cover.WITNESS])
-        if not len(known) or (run[:, cover.STATUS] == cover.COLLISION).any():
+        known = np.flatnonzero(run[:, leaves.WITNESS])
+        if not len(known) or (run[:, leaves.STATUS] == leaves.COLLISION).any():
             continue
-        finest = run[known, cover.LEVEL] + run[known, cover.WITNESS]
+        finest = run[known, leaves.LEVEL] + run[known, leaves.WITNESS]
         row = first + int(known[finest.argmin()])
-        w = int(ints[row, cover.WITNESS])
+        w = int(ints[row, leaves.WITNESS])
         cut = np.repeat(ints[row : row + 1], 3, axis=0)
-        start = int(ints[row, cover.START]) << (w + 1)
+        start = int(ints[row, leaves.START]) << (w + 1)
         middle = start + (1 << w)
-        cut[:, cover.START] = start, middle - 1, middle + 1
-        cut[:, cover.END] = middle - 1, middle + 1, int(ints[row, cover.END]) << (w + 1)
-        cut[:, cover.LEVEL] += w + 1
-        cut[1, cover.STATUS] = cover.COLLISION
+        cut[:, leaves.START] = start, middle - 1, middle + 1
+        cut[:, leaves.END] = middle - 1, middle + 1, int(ints[row, leaves.END]) << (w + 1)
+        cut[:, leaves.LEVEL] += w + 1
+        cut[1, leaves.STATUS] = leaves.COLLISION
         pieces_i += [ints[done:row], cut]
         pieces_f += [floats[done:row], np.repeat(floats[row : row + 1], 3, axis=0)]
         done = row + 1
@@ -139,10 +140,10 @@ def _with_witnesses(ints: np.ndarray, floats: np.ndarray) -> tuple[np.ndarray, n
 
 def _instant(knots_ns: np.ndarray, leaf: np.ndarray, column: int) -> Instant:
     """Return an end of a leaf."""
-    segment = int(leaf[cover.SEGMENT])
+    segment = int(leaf[leaves.SEGMENT])
     knot = int(knots_ns[segment])
     return Instant(
-        knot, int(knots_ns[segment + 1]) - knot, int(leaf[column]), int(leaf[cover.LEVEL])
+        knot, int(knots_ns[segment + 1]) - knot, int(leaf[column]), int(leaf[leaves.LEVEL])
     )
 
 
@@ -163,38 +164,38 @@ def _merged(
     obstacle_names: Sequence[str],
 ) -> Interval:
     """Return an interval, ends still open, with the pair of the smallest gap among the leaves."""
-    status = _STATUS[int(ints[0, cover.STATUS])]
+    status = _STATUS[int(ints[0, leaves.STATUS])]
     if status == Status.FREE:
         return Interval(0, 0, status)
-    reason = '' if status == Status.COLLISION else _REASON[int(ints[0, cover.REASON])].value
-    named = np.flatnonzero(ints[:, cover.BODY] >= 0)
+    reason = '' if status == Status.COLLISION else _REASON[int(ints[0, leaves.REASON])].value
+    named = np.flatnonzero(ints[:, leaves.BODY] >= 0)
     if not len(named):
         return Interval(0, 0, status, reason)
-    worst = int(named[floats[named, cover.UPPER].argmin()])
+    worst = int(named[floats[named, leaves.UPPER].argmin()])
     leaf = ints[worst]
     middle = Instant(
         *_segment(knots_ns, leaf),
-        int(leaf[cover.START]) + int(leaf[cover.END]),
-        int(leaf[cover.LEVEL]) + 1,
+        int(leaf[leaves.START]) + int(leaf[leaves.END]),
+        int(leaf[leaves.LEVEL]) + 1,
     )
-    x, y, z = floats[worst, cover.X : cover.Z + 1].tolist()
+    x, y, z = floats[worst, leaves.X : leaves.Z + 1].tolist()
     return Interval(
         0,
         0,
         status,
         reason,
-        body=link_names[int(leaf[cover.BODY])],
-        obstacle=obstacle_names[int(leaf[cover.OBSTACLE])],
+        body=link_names[int(leaf[leaves.BODY])],
+        obstacle=obstacle_names[int(leaf[leaves.OBSTACLE])],
         at_ns=middle.floor_ns,
         location=(x, y, z),
-        gap_lower=_finite(floats[named, cover.LOWER].min()),
-        gap_upper=_finite(floats[worst, cover.UPPER]),
+        gap_lower=_finite(floats[named, leaves.LOWER].min()),
+        gap_upper=_finite(floats[worst, leaves.UPPER]),
     )
 
 
 def _segment(knots_ns: np.ndarray, leaf: np.ndarray) -> tuple[int, int]:
     """Return start and length of a leaf's segment [ns]."""
-    segment = int(leaf[cover.SEGMENT])
+    segment = int(leaf[leaves.SEGMENT])
     return int(knots_ns[segment]), int(knots_ns[segment + 1]) - int(knots_ns[segment])
 
 

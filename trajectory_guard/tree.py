@@ -1,11 +1,11 @@
-"""A robot's movable joints as kernel arrays: every fixed joint folded away, every axis turned to z."""
+"""A robot's movable joints as kernel arrays: fixed joints folded away, axes turned to z."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from trajectory_guard.body import RIGID_TOLERANCE, rigid_defect
-from trajectory_guard.kernels.chain import PRISMATIC, REVOLUTE, Chain
+from trajectory_guard.body import rigid_defect, RIGID_TOLERANCE
+from trajectory_guard.kernels.chain import Chain, PRISMATIC, REVOLUTE
 from trajectory_guard.robot import Joint, JointType, Robot
 
 
@@ -30,10 +30,10 @@ def tree(robot: Robot) -> Tree:
     """
     Fold a robot's fixed joints into its movable ones.
 
-    A node's frame has the joint axis as z: T_link_node = A with A z = axis, so the turn about the axis
-    is A Rz(q) A^T and A^T is folded into whatever the node carries.  ``depth`` counts every rounded
-    transform on the way, fixed joints and alignments included, so that the kernels' margin covers
-    the folding.
+    A node's frame has the joint axis as z: T_link_node = A with A z = axis, so the turn about the
+    axis is A Rz(q) A^T and A^T is folded into whatever the node carries.  ``depth`` counts every
+    rounded transform on the way, fixed joints and alignments included, so that the kernels' margin
+    covers the folding.
 
     :param robot: the robot.
     """
@@ -42,7 +42,9 @@ def tree(robot: Robot) -> Tree:
     path = {robot.root: 0.0}
     steps = {robot.root: 0}
     deepest: dict[int, int] = {}
-    parent, kind, transform = [], [], []
+    parent: list[int] = []
+    kind: list[int] = []
+    transform: list[np.ndarray] = []
     for joint in robot.joints:
         above = _rigid(pose[joint.parent] @ joint.T_parent_joint)
         steps[joint.child] = steps[joint.parent] + 1

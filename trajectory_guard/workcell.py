@@ -17,17 +17,15 @@ class Pairs:
     """
     Which bodies a set of commanded joints moves against which obstacles.
 
-    :param body: (P,) int64 packed bodies, and obstacle (P,) int64 packed obstacles, to check.
-    :param still_body: (Q,) int64, and still_obstacle (Q,) int64: pairs that the joints do not move.
-    :param checked: number of pairs of a link and an obstacle among the first.
+    :param checked: (P, 2) int64: packed body and packed obstacle of every pair to check.
+    :param still: (Q, 2) int64: the pairs that the joints do not move.
+    :param count: number of pairs of a link and an obstacle among the first.
     :param unchecked: what is left out, in words.
     """
 
-    body: np.ndarray
-    obstacle: np.ndarray
-    still_body: np.ndarray
-    still_obstacle: np.ndarray
-    checked: int
+    checked: np.ndarray
+    still: np.ndarray
+    count: int
     unchecked: tuple[str, ...]
 
 
@@ -81,11 +79,13 @@ class Workcell:
         keep('links', solids(bodies, [folded.link_node[name] for name in names]))
         keep(
             'obstacles',
-            solids([b for o in self.scene.obstacles for b in o.bodies], [-1] * len(obstacle_names)),
+            solids(
+                [b for o in self.scene.obstacles for b in o.bodies], [-1] * len(obstacle_names)
+            ),
         )
         keep('link_names', tuple(names))
         keep('obstacle_names', tuple(obstacle_names))
-        keep('link_nodes', self.links.index[:, NODE].copy())
+        keep('link_nodes', self.links.ranges[:, NODE].copy())
         keep('extent', self.links.size[:, FAR].copy())
         keep('perpendicular', np.array([perpendicular(body) for body in bodies]))
         keep('offsets', np.array([folded.link_path[name] for name in names]))
@@ -111,20 +111,25 @@ class Workcell:
         body_moved = np.array([node >= 0 and moved[node] for node in self.link_nodes])
         if not body_moved.any():
             raise RobotError(
-                Reason.ROBOT_EMPTY, 'no joint of the trajectory moves a link with collision geometry'
+                Reason.ROBOT_EMPTY,
+                'no joint of the trajectory moves a link with collision geometry',
             )
-        every = np.arange(len(self.obstacle_names), dtype=np.int64)
-        moving = np.flatnonzero(body_moved).astype(np.int64)
-        still = np.flatnonzero(~body_moved).astype(np.int64)
+        moving = np.flatnonzero(body_moved)
+        still = np.flatnonzero(~body_moved)
         moving_links = {self.link_names[b] for b in moving}
         still_links = sorted({self.link_names[b] for b in still})
         unchecked = ['links of the robot against each other']
         unchecked += [f'{link} against the scene: no joint moves it' for link in still_links]
         return Pairs(
-            body=np.repeat(moving, len(every)),
-            obstacle=np.tile(every, len(moving)),
-            still_body=np.repeat(still, len(every)),
-            still_obstacle=np.tile(every, len(still)),
-            checked=len(moving_links) * len(self.scene.obstacles),
+            checked=_product(moving, len(self.obstacle_names)),
+            still=_product(still, len(self.obstacle_names)),
+            count=len(moving_links) * len(self.scene.obstacles),
             unchecked=tuple(unchecked),
         )
+
+
+def _product(bodies: np.ndarray, obstacles: int) -> np.ndarray:
+    """Return every pair of one of the bodies and an obstacle, (P, 2) int64."""
+    return np.column_stack(
+        [np.repeat(bodies, obstacles), np.tile(np.arange(obstacles), len(bodies))]
+    ).astype(np.int64)

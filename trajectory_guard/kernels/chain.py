@@ -1,13 +1,13 @@
 r"""
 Rational motion of every link of a chain on one piece (trusted).
 
-With u = tan(angle / 2) a rotation about z is (1 / (1 + u^2)) [[1-u^2, -2u], [2u, 1-u^2]]: a rational
-curve.  A chain of such rotations, constant rigid transforms and polynomial slides is a rational
-Bezier curve in the 12-dimensional space of affine displacements [Schroecker & Weber 2014, sec. 6] of degree
-6 per moving revolute joint and 3 per moving prismatic one.  All factors are kept in the *scaled*
-Bernstein basis b_i C(n, i), in which a product is a plain convolution and the binomials cancel in
-C_i / w_i.  If every weight is positive the link's point x lies, at every instant of the piece, in the
-convex hull of the points C_i x / w_i.
+With u = tan(angle / 2) a rotation about z is (1 / (1 + u^2)) [[1-u^2, -2u], [2u, 1-u^2]]: a
+rational curve.  A chain of such rotations, constant rigid transforms and polynomial slides is a
+rational Bezier curve in the 12-dimensional space of affine displacements [Schroecker & Weber 2014,
+sec. 6] of degree 6 per moving revolute joint and 3 per moving prismatic one.  All factors are kept
+in the *scaled* Bernstein basis b_i C(n, i), in which a product is a plain convolution and the
+binomials cancel in C_i / w_i.  If every weight is positive the link's point x lies, at every
+instant of the piece, in the convex hull of the points C_i x / w_i.
 """
 
 import math
@@ -29,7 +29,8 @@ class Chain(NamedTuple):
 
     parent (n,) int64: node above, -1 for the root; parents come before children.
     kind (n,) int64: REVOLUTE or PRISMATIC.
-    transform (n, 12): constant pose of the node, before its own motion, in its parent node's frame.
+    transform (n, 12): constant pose of the node, before its own motion, in its parent node's
+    frame.
     depth (n,) int64: number of nodes from the root down to this one.
     """
 
@@ -54,9 +55,7 @@ def compose(a, i, ai, b, j, bj, out, k, ok):
         z = a[i, ai, r + 2]
         for c in range(3):
             out[k, ok, r + c] = x * b[j, bj, c] + y * b[j, bj, 4 + c] + z * b[j, bj, 8 + c]
-        out[k, ok, r + 3] = (
-            x * b[j, bj, 3] + y * b[j, bj, 7] + z * b[j, bj, 11] + a[i, ai, r + 3]
-        )
+        out[k, ok, r + 3] = x * b[j, bj, 3] + y * b[j, bj, 7] + z * b[j, bj, 11] + a[i, ai, r + 3]
 
 
 @kernel
@@ -113,8 +112,8 @@ def factors(kind, u, j, cosine, sine, weight):
     :param cosine: (7,) out: 1 - u^2.
     :param sine: (7,) out: 2 u.
     :param weight: (7,) out: 1 + u^2 (prismatic: the constant 1).
-    :returns: degree, and ``max_i (|cosine_i| + |sine_i|) / weight_i`` (NaN or infinite if a weight is
-        not positive).
+    :returns: degree, and ``max_i (|cosine_i| + |sine_i|) / weight_i`` (NaN or infinite if a weight
+        is not positive).
     """
     if kind != REVOLUTE:
         weight[0] = 1.0
@@ -214,8 +213,8 @@ def extend(chain, j, moving, u, local, controls, count, kappa, scratch, cosine, 
     :param local: (n, 1, 12) pose in the parent's frame at the centre.
     :param controls: (n, K, 13) in/out: scaled control matrices and weights.
     :param count: (n,) int64 out: number of control matrices of the node.
-    :param kappa: (n,) out: bound on their column norms over the weight, infinite when the enclosure
-        is unusable.
+    :param kappa: (n,) out: bound on their column norms over the weight, infinite when the
+        enclosure is unusable.
     """
     p = chain.parent[j]
     if p < 0:
@@ -246,9 +245,7 @@ def extend(chain, j, moving, u, local, controls, count, kappa, scratch, cosine, 
         return
     degree, growth = factors(chain.kind[j], u, j, cosine, sine, weight)
     kappa[j] *= growth
-    convolve(
-        scratch, n, chain.kind[j], u, j, cosine, sine, weight, degree, controls
-    )
+    convolve(scratch, n, chain.kind[j], u, j, cosine, sine, weight, degree, controls)
     count[j] = n + degree
 
 

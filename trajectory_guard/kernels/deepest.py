@@ -1,10 +1,11 @@
 r"""
-A point deep inside both solids at one instant (search), and how deep it really is (trusted for G3).
+A point deep inside both solids at one instant (search), and how deep it is (trusted for G3).
 
-Maximise t subject to a.y + t <= d over the faces of both solids: the centre of the largest common ball of two
-polytopes.  Dual simplex on a 4x4 basis: start from an artificial tetrahedron, bring in the most violated face,
-drop the one that keeps the multipliers positive.  The optimum only falls, so t <= 0 ends the search.
-The multipliers of the link's faces add up to the direction in which the two are least entangled.
+Maximise t subject to a.y + t <= d over the faces of both solids: the centre of the largest common
+ball of two polytopes.  Dual simplex on a 4x4 basis: start from an artificial tetrahedron, bring in
+the most violated face, drop the one that keeps the multipliers positive.  The optimum only falls,
+so t <= 0 ends the search. The multipliers of the link's faces add up to the direction in which the
+two are least entangled.
 """
 
 import math
@@ -68,9 +69,7 @@ def depth(faces, first, last, x, y, z):
     """
     best = math.inf
     for f in range(first, last):
-        best = min(
-            best, faces[f, 3] - faces[f, 0] * x - faces[f, 1] * y - faces[f, 2] * z
-        )
+        best = min(best, faces[f, 3] - faces[f, 0] * x - faces[f, 1] * y - faces[f, 2] * z)
     if last > first:
         return best
     return -math.inf
@@ -88,15 +87,15 @@ def deepest(pose, node, links, b, obstacles, o, basis, value, inverse, weight, m
         the link in the root frame that separates them soonest (zero if none).
     :returns: True if some point is inside both.
     """
-    first = links.index[b, FACE_FIRST]
-    last = links.index[b, FACE_LAST]
-    count = obstacles.index[o, FACE_LAST] - obstacles.index[o, FACE_FIRST]
+    first = links.ranges[b, FACE_FIRST]
+    last = links.ranges[b, FACE_LAST]
+    count = obstacles.ranges[o, FACE_LAST] - obstacles.ranges[o, FACE_FIRST]
     for k in range(6):
         out[k] = 0.0
     if last == first or count == 0:
         return False
     for f in range(count):
-        row = obstacles.index[o, FACE_FIRST] + f
+        row = obstacles.ranges[o, FACE_FIRST] + f
         nx = obstacles.faces[row, 0]
         ny = obstacles.faces[row, 1]
         nz = obstacles.faces[row, 2]
@@ -110,7 +109,12 @@ def deepest(pose, node, links, b, obstacles, o, basis, value, inverse, weight, m
     radius = links.size[b, CORE] + links.size[b, BALL]
     tiny = 1e-12 * radius
     _artificial(
-        basis, value, links.place[b, CENTRE], links.place[b, CENTRE + 1], links.place[b, CENTRE + 2], 4.0 * radius
+        basis,
+        value,
+        links.place[b, CENTRE],
+        links.place[b, CENTRE + 1],
+        links.place[b, CENTRE + 2],
+        4.0 * radius,
     )
     for k in range(4):
         weight[k] = 0.25

@@ -1,41 +1,42 @@
 r"""
 Polynomial motion of every link of a chain, economised after every joint (trusted).
 
-The space of affine displacements is linear, so weights may be 1: keep the pose of a node as a polynomial
-of degree 5 in tau on [-1, 1] and push what is above degree 5 down after every product.  Building the rational
-curve costs degree 6 per joint; this costs the same for every joint.
+The space of affine displacements is linear, so weights may be 1: keep the pose of a node as a
+polynomial of degree 5 in tau on [-1, 1] and push what is above degree 5 down after every product.
+Building the rational curve costs degree 6 per joint; this costs the same for every joint.
 
-**Economising** replaces c tau^k by c (tau^k - 2^(1-k) T_k), from the top down, an error of at most |c| 2^(1-k).
+**Economising** replaces c tau^k by c (tau^k - 2^(1-k) T_k), from the top down, an error of at most
+|c| 2^(1-k).
 
-**Angle.**  phi = sum_{i>=1} d_i tau^i, |phi| <= Phi < 1.5.  With y = phi^2 economised (error e_y), cosine and
-sine are their Taylor sums to phi^8 and phi^9 by Horner's rule in y; a product of a factor H with error e_H and
-y has the error |H| e_y + |y| e_H plus what is dropped, and the series end with at most Phi^10 / 10! and
-Phi^11 / 11!.  So the joint's matrix differs from a rotation by at most
-delta = sqrt(e_cos^2 + e_sin^2) in the plane across its axis.
+**Angle.**  phi = sum_{i>=1} d_i tau^i, |phi| <= Phi < 1.5.  With y = phi^2 economised (error e_y),
+cosine and sine are their Taylor sums to phi^8 and phi^9 by Horner's rule in y; a product of a
+factor H with error e_H and y has the error |H| e_y + |y| e_H plus what is dropped, and the series
+end with at most Phi^10 / 10! and Phi^11 / 11!.  So the joint's matrix differs from a rotation by
+at most delta = sqrt(e_cos^2 + e_sin^2) in the plane across its axis.
 
-**Chain.**  Let G_j be the polynomial pose of node j as stored, rounding included, and q_j the point in node j's
-frame at the true positions of all joints beyond j.  Comparing consecutive nodes *on the same true
-point* telescopes the error of the whole chain into
+**Chain.**  Let G_j be the polynomial pose of node j as stored, rounding included, and q_j the
+point in node j's frame at the true positions of all joints beyond j.  Comparing consecutive nodes
+*on the same true point* telescopes the error of the whole chain into
 
     sum_j | G_j(q_j) - G_{j-1}(M_j R_j q_j) |
       <= sum_j rho_j (delta_j (1 + eps_{j-1}) + trunc_j) + rounding_j,
 
-where rho_j bounds the distance of q_j to the axis (the error of the rotation and the dropped matrices, which have
-only the columns x and y, act on that distance), trunc_j = sum_k ||c_k||_F 2^(1-k) over the dropped coefficient
-matrices, and eps_j = eps_{j-1} + delta_j (1 + eps_{j-1}) + trunc_j bounds the deviation of the
-linear part from a rotation.  Nothing is transported, because each difference is taken with the true remainder
-of the chain.  A slide adds the z column times its polynomial: only trunc_j, with the norm of the dropped
-translations and rho_j = 1.
+where rho_j bounds the distance of q_j to the axis (the error of the rotation and the dropped
+matrices, which have only the columns x and y, act on that distance), trunc_j = sum_k ||c_k||_F
+2^(1-k) over the dropped coefficient matrices, and eps_j = eps_{j-1} + delta_j (1 + eps_{j-1}) +
+trunc_j bounds the deviation of the linear part from a rotation.  Nothing is transported, because
+each difference is taken with the true remainder of the chain.  A slide adds the z column times its
+polynomial: only trunc_j, with the norm of the dropped translations and rho_j = 1.
 
 **Rounding** of a node is local for the same reason.  A new column is two products of degree-5
-polynomials (11 terms at most, each rounded twice) and five economising steps, whose coefficients sum to less
-than 7 in absolute value; relative to
+polynomials (11 terms at most, each rounded twice) and five economising steps, whose coefficients
+sum to less than 7 in absolute value; relative to
 
     kappa_j = 8 (|cos|_1 + |sin|_1) S_{j-1},      S = sum_k ||linear part of coefficient k||_F,
 
-that is less than (16 + 4 + 22 + 10) u per entry and less than 128 u per point, to which the constant
-transform's 20 u and the six-term Bernstein sums belong too; ``margin.CHAIN`` = 256 covers them with kappa the
-largest along the chain, once per joint.
+that is less than (16 + 4 + 22 + 10) u per entry and less than 128 u per point, to which the
+constant transform's 20 u and the six-term Bernstein sums belong too; ``margin.CHAIN`` = 256 covers
+them with kappa the largest along the chain, once per joint.
 """
 
 import math
@@ -148,7 +149,8 @@ def _series(y, a0, a1, a2, a3, a4, y_max, y_error):
     """
     Return a0 + y (a1 + y (a2 + y (a3 + y a4))) by Horner's rule, and a bound on its error.
 
-    :param y: the economised polynomial; y_max bounds the exact one, y_error what economising it cost.
+    :param y: the economised polynomial; y_max bounds the exact one, y_error what economising it
+        cost.
     """
     h = (a4 * y[0] + a3, a4 * y[1], a4 * y[2], a4 * y[3], a4 * y[4], a4 * y[5])
     # `size` bounds the exact factor, `error` its distance to the stored one.

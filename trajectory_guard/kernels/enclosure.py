@@ -1,5 +1,5 @@
 """
-The enclosure of all link motions on one piece: poses at its centre, control points, errors (trusted).
+All link motions on one piece: poses at its centre, control points, errors (trusted).
 
 One value serves every pair of the piece; nothing is computed for links that no open pair needs.
 """
@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from trajectory_guard.kernels.chain import (
-    POSE,
-    PRISMATIC,
     divide,
     extend,
     place,
+    POSE,
+    PRISMATIC,
     turn,
 )
 from trajectory_guard.kernels.economised import (
@@ -23,14 +23,14 @@ from trajectory_guard.kernels.economised import (
     extend_economised,
 )
 from trajectory_guard.kernels.jit import kernel
-from trajectory_guard.kernels.margin import UP, chain_margin
+from trajectory_guard.kernels.margin import chain_margin, UP
 from trajectory_guard.kernels.piece import (
     FIT,
-    POWERS,
-    TERMS,
     fit_half_angle,
     fit_slide,
+    POWERS,
     restrict,
+    TERMS,
 )
 
 LARGEST_DEGREE = 2 * FIT  # of one joint
@@ -68,10 +68,11 @@ class Enclosure(NamedTuple):
     fitted (n, 4), fit (n,): scaled coefficients of the joint's motion and its error.
     local, pose (n, 1, 12): poses at the centre, in the parent's and in the root frame.
     controls (n, K, 13), points (n, K, 12): control matrices, and the same over their weights.
-    count (n,), kappa (n,), sound (n,): their number, column bound, and whether they are usable.
+    number (n,), kappa (n,), sound (n,): their number, column bound, and whether they are usable.
     needed (n,) bool: nodes with an open pair at or beyond them.
     power (16,), cosine, sine, weight (7,), scratch (K, 13): scratch.
-    powers (n, 12, 6), eps (n,), size (n,): polynomial poses, see ``economised``; column (12, 6): its scratch.
+    powers (n, 12, 6), eps (n,), size (n,): polynomial poses, see ``economised``; column (12, 6):
+    its scratch.
     """
 
     d: np.ndarray
@@ -83,7 +84,7 @@ class Enclosure(NamedTuple):
     pose: np.ndarray
     controls: np.ndarray
     points: np.ndarray
-    count: np.ndarray
+    number: np.ndarray
     kappa: np.ndarray
     sound: np.ndarray
     needed: np.ndarray
@@ -156,12 +157,21 @@ def centre(chain, path, segment, m, h, e):
 
 @kernel
 def fit(chain, e, builder):
-    """Fit the motion of every needed joint; what it adds to an error per lever arm goes to ``e.fit``."""
+    """Fit the motion of every needed joint and its error per lever arm."""
     for j in range(len(chain.parent)):
         if e.needed[j]:
             if builder == ECONOMISED:
                 extend_economised(
-                    chain, j, e.span, e.d, e.local, e.powers, e.fit, e.eps, e.size, e.kappa,
+                    chain,
+                    j,
+                    e.span,
+                    e.d,
+                    e.local,
+                    e.powers,
+                    e.fit,
+                    e.eps,
+                    e.size,
+                    e.kappa,
                     e.column,
                 )
             elif e.span[j] == 0.0:
@@ -179,7 +189,7 @@ def build(chain, e, builder):
         if not e.needed[j]:
             continue
         if builder == ECONOMISED:
-            e.count[j] = CONTROLS
+            e.number[j] = CONTROLS
             e.sound[j] = control_points(j, e.powers, e.points)
         else:
             extend(
@@ -189,14 +199,14 @@ def build(chain, e, builder):
                 e.fitted,
                 e.local,
                 e.controls,
-                e.count,
+                e.number,
                 e.kappa,
                 e.scratch,
                 e.cosine,
                 e.sine,
                 e.weight,
             )
-            e.sound[j] = divide(j, e.controls, e.count, e.points)
+            e.sound[j] = divide(j, e.controls, e.number, e.points)
         e.sound[j] = e.sound[j] and e.kappa[j] < math.inf
 
 
@@ -207,8 +217,9 @@ def displacement(chain, path, b, node, e):
 
     :param b: body.
     :param node: its node.
-    :returns: four lengths [m]: largest displacement from the centre pose over the piece; the same without
-        the chord's cap (linear in the piece's length); error of the centre pose; tracking inflation.
+    :returns: four lengths [m]: largest displacement from the centre pose over the piece; the same
+        without the chord's cap (linear in the piece's length); error of the centre pose; tracking
+        inflation.
     """
     sweep = 0.0
     linear = 0.0

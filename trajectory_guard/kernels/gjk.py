@@ -1,9 +1,9 @@
 """
 Search for a separating direction and for nearest points (untrusted: it only proposes).
 
-Gilbert, Johnson and Keerthi's iteration on the difference of two cores; a "link" is the convex hull of
-its images under several poses, so one pose gives the distance at an instant and the control points of
-a motion give a direction for the whole piece.
+Gilbert, Johnson and Keerthi's iteration on the difference of two cores; a "link" is the convex
+hull of its images under several poses, so one pose gives the distance at an instant and the
+control points of a motion give a direction for the whole piece.
 """
 
 import math
@@ -168,8 +168,8 @@ def _rim(gx, gy, gz, solids, b, sign, m):
 def _argleast(gx, gy, gz, solids, b):
     """Return the vertex with the least g.v."""
     best = math.inf
-    which = solids.index[b, FIRST]
-    for v in range(np.uint64(solids.index[b, FIRST]), np.uint64(solids.index[b, LAST])):
+    which = solids.ranges[b, FIRST]
+    for v in range(np.uint64(solids.ranges[b, FIRST]), np.uint64(solids.ranges[b, LAST])):
         value = (
             gx * solids.vertices[0, v] + gy * solids.vertices[1, v] + gz * solids.vertices[2, v]
         )
@@ -203,7 +203,9 @@ def _vertex(nx, ny, nz, points, node, i, links, b, obstacles, o, s, k):
 
 
 @kernel
-def gjk(nx, ny, nz, points, node, count, links, b, obstacles, o, want, accuracy, rounds, s, w, out):
+def gjk(
+    nx, ny, nz, points, node, count, links, b, obstacles, o, want, accuracy, rounds, s, w, out
+):
     """
     Propose a direction that separates a link's images from an obstacle.
 
@@ -215,8 +217,8 @@ def gjk(nx, ny, nz, points, node, count, links, b, obstacles, o, want, accuracy,
     :param rounds: largest number of support points.
     :param s: (4, 6) scratch, simplex: differences and obstacle points.
     :param w: (4,) scratch.
-    :param out: (8,) out: best direction, its support difference, distance of the nearest points found,
-        and the obstacle's nearest point [m].
+    :param out: (8,) out: best direction, its support difference, distance of the nearest points
+        found, and the obstacle's nearest point [m].
     :returns: SEPARATED, OVERLAP or REACHED (cores only: balls are the caller's).
     """
     n = 0

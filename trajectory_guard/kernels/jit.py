@@ -10,6 +10,7 @@ from collections.abc import Callable
 import hashlib
 import os
 from pathlib import Path
+from typing import Any
 
 from numba import config, njit
 
@@ -30,23 +31,23 @@ def _folder() -> Path | None:
 
 
 FOLDER = _folder()
+OPTIONS: dict[str, Any] = {
+    'cache': FOLDER is not None,
+    'nogil': True,
+    'error_model': 'numpy',
+    'fastmath': False,
+    'no_cfunc_wrapper': True,
+}
 
 
-def _compiled(function: Callable, **options: bool) -> Callable:
+def _compiled(function: Callable, **options: Any) -> Callable:
     """Decorate a kernel; its cache goes to the folder of these sources, or nowhere."""
-    previous = config.CACHE_DIR
-    config.CACHE_DIR = str(FOLDER or '')
+    previous = getattr(config, 'CACHE_DIR')  # noqa: B009 - numba makes it at import
+    setattr(config, 'CACHE_DIR', str(FOLDER or ''))  # noqa: B010
     try:
-        return njit(
-            cache=FOLDER is not None,
-            nogil=True,
-            error_model='numpy',
-            fastmath=False,
-            no_cfunc_wrapper=True,
-            **options,
-        )(function)
+        return njit(**OPTIONS, **options)(function)
     finally:
-        config.CACHE_DIR = previous
+        setattr(config, 'CACHE_DIR', previous)  # noqa: B010
 
 
 def kernel(function: Callable) -> Callable:

@@ -5,16 +5,16 @@ Let u = 2^-53.  Every bound below is of the form ``constant * u * size`` where *
 the coordinates that enter, never an absolute number, so it scales from micrometres to kilometres.
 
 **Control matrices** (``chain``).  Let ``kappa`` be the product over the moving joints of
-``max_i (|c_i| + |s_i|) / w_i`` (c, s, w: Bernstein coefficients of 1-u^2, 2u, 1+u^2); the columns of
-an exact control matrix, divided by its weight, have norm at most ``kappa``.  A step of the chain is a
-product with a constant rigid transform (3 products and 3 sums per entry) followed by a convolution
-with at most 7 coefficients per column, two products each.  The constant transform itself is the
-rounded image of an exactly rigid one: origin, axis alignment, and the turn by the piece's central
-angle, at most 16 u relative to its norm.  Relative to the norm of what it acts on a step therefore
-adds at most (16 + 4 + 2*7 + 2) u * sqrt(3) * sqrt(3) < 128 u; the coefficients c, s, w carry
-(products of three-term polynomials) at most 24 u more.  Errors of earlier steps are transported by
-factors whose norm is already in kappa, so they add.  After ``depth`` steps and the division by the
-weight the image of a point x differs from the exact one by at most
+``max_i (|c_i| + |s_i|) / w_i`` (c, s, w: Bernstein coefficients of 1-u^2, 2u, 1+u^2); the columns
+of an exact control matrix, divided by its weight, have norm at most ``kappa``.  A step of the
+chain is a product with a constant rigid transform (3 products and 3 sums per entry) followed by a
+convolution with at most 7 coefficients per column, two products each.  The constant transform
+itself is the rounded image of an exactly rigid one: origin, axis alignment, and the turn by the
+piece's central angle, at most 16 u relative to its norm.  Relative to the norm of what it acts on
+a step therefore adds at most (16 + 4 + 2*7 + 2) u * sqrt(3) * sqrt(3) < 128 u; the coefficients c,
+s, w carry (products of three-term polynomials) at most 24 u more.  Errors of earlier steps are
+transported by factors whose norm is already in kappa, so they add.  After ``depth`` steps and the
+division by the weight the image of a point x differs from the exact one by at most
 
     CHAIN * (depth + 1) * u * kappa * reach,         CHAIN = 256,
 

@@ -1,8 +1,8 @@
 r"""
 One joint on one piece of time: its polynomial and the half-angle fit (trusted).
 
-On a piece [k, k+1] / 2^n of a segment, s = m + h tau with tau in [-1, 1]; m and h are dyadic and exact.
-The joint moves as q = d_0 + phi(tau), phi = sum_{i>=1} d_i tau^i.
+On a piece [k, k+1] / 2^n of a segment, s = m + h tau with tau in [-1, 1]; m and h are dyadic and
+exact. The joint moves as q = d_0 + phi(tau), phi = sum_{i>=1} d_i tau^i.
 
 **Half-angle.**  With x = phi / 2 and X = sum_{i>=1} |d_i| / 2 < 1 the rational rotation with
 u(tau) ~ tan(x) has the angle 2 atan(u), and because atan is 1-Lipschitz
@@ -10,8 +10,8 @@ u(tau) ~ tan(x) has the angle 2 atan(u), and because atan is 1-Lipschitz
     |2 atan u - phi| <= 2 |u - tan x| <= 2 (|u - x - x^3/3| + r),
     |r| <= (2/15) X^5 / (1 - 0.41 X^2).
 
-The Taylor coefficients of tan beyond x^3/3 are positive and their ratios increase to 4/pi^2 < 0.41,
-which gives r.  The polynomial x + x^3/3 is economised to degree 3 from the top down:
+The Taylor coefficients of tan beyond x^3/3 are positive and their ratios increase to 4/pi^2 <
+0.41, which gives r.  The polynomial x + x^3/3 is economised to degree 3 from the top down:
 tau^k is replaced by tau^k - 2^(1-k) T_k(tau), an error of at most 2^(1-k) times its coefficient.
 
 **Rounding of the angle.**  The Taylor shift of a polynomial of degree 5 to m in [0, 1] is 15
@@ -35,9 +35,7 @@ def _economisers() -> np.ndarray:
     """Row k holds tau^k - 2^(1-k) T_k in powers of tau; exact in double for these degrees."""
     rows = np.zeros((POWERS, POWERS))
     for k in range(1, POWERS):
-        rows[k, :k] = (
-            -np.polynomial.chebyshev.cheb2poly([0.0] * k + [1.0])[:k] * 2.0 ** (1 - k)
-        )
+        rows[k, :k] = -np.polynomial.chebyshev.cheb2poly([0.0] * k + [1.0])[:k] * 2.0 ** (1 - k)
     return rows
 
 
@@ -97,7 +95,8 @@ def bernstein(p, joint, controls):
     """
     Write the scaled Bernstein coefficients of a cubic on [-1, 1].
 
-    With r = s, v = 1 - s the basis tau^k 1^(3-k) = (r - v)^k (r + v)^(3-k) expands with small integers.
+    With r = s, v = 1 - s the basis tau^k 1^(3-k) = (r - v)^k (r + v)^(3-k) expands with small
+    integers.
 
     :param p: power coefficients in tau, degree 3.
     :param joint: row to write.

@@ -6,10 +6,10 @@ If joint j is off by an angle eps, a point at distance r from its axis is off by
 
     |x(theta + eps) - x(theta)| <= sum_j min(|eps_j|, 2) rho_j(x),
 
-where rho_j(x) bounds the distance of x to the axis of joint j over *all* configurations of the joints
-beyond j (for a prismatic joint the factor is |eps_j| and rho_j = 1).  The distance to the axis is at most the
-part of the next joint's origin perpendicular to the axis plus the lengths of all later offsets
-and slides plus |x|.
+where rho_j(x) bounds the distance of x to the axis of joint j over *all* configurations of the
+joints beyond j (for a prismatic joint the factor is |eps_j| and rho_j = 1).  The distance to the
+axis is at most the part of the next joint's origin perpendicular to the axis plus the lengths of
+all later offsets and slides plus |x|.
 """
 
 import math

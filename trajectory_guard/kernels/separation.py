@@ -2,14 +2,15 @@ r"""
 The inequality that certifies (trusted).
 
 Let P_i = C_i / w_i be the control points of a link's motion on a piece, all weights positive, and
-n a unit vector.  The link's point x stays in conv{P_i x}; the link's solid is the convex hull of its
-vertices v plus a disc plus a ball of radius r, the obstacle likewise with vertices p and radius r'.  If e
-bounds how far the true, toleranced motion can leave the rational one, then during the whole piece
+n a unit vector.  The link's point x stays in conv{P_i x}; the link's solid is the convex hull of
+its vertices v plus a disc plus a ball of radius r, the obstacle likewise with vertices p and
+radius r'.  If e bounds how far the true, toleranced motion can leave the rational one, then during
+the whole piece
 
     distance >= min_{i,v} n.(P_i v) - e - r - (max_p n.p + r') - rounding,
 
-because a linear function on a convex hull is least at one of its generators.  A disc of radius R and
-axis a adds -R |g - (g.a) a| with g = P_i^T n, its exact support.  The direction may come from
+because a linear function on a convex hull is least at one of its generators.  A disc of radius R
+and axis a adds -R |g - (g.a) a| with g = P_i^T n, its exact support.  The direction may come from
 anywhere; only this number decides.
 """
 
@@ -18,7 +19,7 @@ import math
 import numpy as np
 
 from trajectory_guard.kernels.jit import kernel
-from trajectory_guard.kernels.margin import UP, chain_margin, plane_margin
+from trajectory_guard.kernels.margin import chain_margin, plane_margin, UP
 from trajectory_guard.kernels.minimum import minimum
 from trajectory_guard.kernels.solids import (
     AXIS,
@@ -58,11 +59,11 @@ def least(gx, gy, gz, solids, b):
     """
     Return the least g.v over the vertices of a solid, NaN if any term is NaN.
 
-    The indices are unsigned: a signed one may be negative for the compiler, and that keeps the loop
-    scalar.
+    The indices are unsigned: a signed one may be negative for the compiler, and that keeps the
+    loop scalar.
     """
     best = math.inf
-    for v in range(np.uint64(solids.index[b, FIRST]), np.uint64(solids.index[b, LAST])):
+    for v in range(np.uint64(solids.ranges[b, FIRST]), np.uint64(solids.ranges[b, LAST])):
         best = minimum(
             best,
             gx * solids.vertices[0, v] + gy * solids.vertices[1, v] + gz * solids.vertices[2, v],
@@ -75,8 +76,8 @@ def lowest(nx, ny, nz, points, node, count, links, b):
     """
     Return the least n.(P_i x) over control points and the core of a link, and the control point.
 
-    A control point is skipped only if its sphere around the core cannot go lower; the one whose sphere
-    goes lowest is tried first.
+    A control point is skipped only if its sphere around the core cannot go lower; the one whose
+    sphere goes lowest is tried first.
 
     :param points: (n, K, 12) control points of the nodes.
     :param count: how many the node has.

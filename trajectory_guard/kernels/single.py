@@ -35,7 +35,7 @@ def link_motion(chain, links, path, body, segment, m, h, builder):
     """
     nodes = len(chain.parent)
     e = enclosure(nodes, nodes, builder)
-    node = links.index[body, NODE]
+    node = links.ranges[body, NODE]
     j = node
     while j >= 0:
         e.needed[j] = True
@@ -47,7 +47,7 @@ def link_motion(chain, links, path, body, segment, m, h, builder):
     error = fit_error(chain, path, body, node, e) + chain_margin(
         float(chain.depth[node]), e.kappa[node], path.reach[body]
     )
-    count = e.count[node]
+    count = e.number[node]
     matrices = np.empty((count, POSE))
     weights = np.empty(count)
     for i in range(count):

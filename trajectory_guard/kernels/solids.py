@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Columns of `index`.
+# Columns of `ranges`.
 FIRST, LAST, FACE_FIRST, FACE_LAST, NODE = range(5)
-# Columns of `size` [m]: balls, discs, spheres around vertices and disc, farthest point from the origin.
+# Columns of `size` [m]: ball, disc, sphere around vertices and disc, farthest point's distance.
 BALL, DISC, CORE, FAR = range(4)
 # Columns of `place`: disc normal, sphere centre, box half sides, pose of the box (12).
 AXIS, CENTRE, HALF, BOX = 0, 3, 6, 9
@@ -18,17 +18,17 @@ class Solids(NamedTuple):
 
     Few arrays, because every array that a kernel is handed costs a reference count.
 
-    index (B, 5) int64: FIRST:LAST vertices, FACE_FIRST:FACE_LAST faces, NODE that carries the solid
-        (-1: the root).
+    ranges (B, 5) int64: FIRST:LAST vertices, FACE_FIRST:FACE_LAST faces, NODE that carries the
+        solid (-1: the root).
     size (B, 4): BALL radius, DISC radius, CORE radius of the sphere around vertices and disc, FAR
         the largest distance of the solid from the frame's origin [m].
-    place (B, 21): AXIS unit normal of the disc, CENTRE of the CORE sphere, HALF sides and pose BOX of an
-        oriented box that contains vertices and disc [m].
+    place (B, 21): AXIS unit normal of the disc, CENTRE of the CORE sphere, HALF sides and pose BOX
+        of an oriented box that contains vertices and disc [m].
     vertices (3, V): coordinates [m].
     faces (F, 4): rows (n, d), halfspaces n.x <= d of an inscribed polytope.
     """
 
-    index: np.ndarray
+    ranges: np.ndarray
     size: np.ndarray
     place: np.ndarray
     vertices: np.ndarray

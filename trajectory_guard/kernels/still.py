@@ -1,17 +1,17 @@
-"""Pairs that no joint of a request moves: do they touch where they stand? (untrusted, for a warning)"""
+"""Pairs that no joint of a request moves: which touch where they stand (for a warning)."""
 
 import math
 
 import numpy as np
 
 from trajectory_guard.kernels.enclosure import centre, enclosure, RATIONAL
-from trajectory_guard.kernels.gjk import OVERLAP, ROUNDS, gjk
+from trajectory_guard.kernels.gjk import gjk, OVERLAP, ROUNDS
 from trajectory_guard.kernels.jit import entry
 from trajectory_guard.kernels.solids import BALL, NODE
 
 
 @entry
-def overlaps(chain, links, obstacles, path, pair_body, pair_obstacle):
+def overlaps(chain, links, obstacles, path, pairs):
     """
     Say which pairs touch at the path's first instant.
 
@@ -19,7 +19,7 @@ def overlaps(chain, links, obstacles, path, pair_body, pair_obstacle):
     :param links: :class:`~trajectory_guard.kernels.solids.Solids` in node frames.
     :param obstacles: the same in the root frame.
     :param path: :class:`~trajectory_guard.kernels.enclosure.Path`.
-    :param pair_body: (Q,) int64 bodies, and pair_obstacle (Q,) int64 obstacles.
+    :param pairs: (Q, 2) int64: body and obstacle.
     :returns: (Q,) bool.
     """
     nodes = len(chain.parent)
@@ -30,18 +30,32 @@ def overlaps(chain, links, obstacles, path, pair_body, pair_obstacle):
     root = nodes  # a node of its own for what is fixed to the root
     for i in range(12):
         e.pose[root, 0, i] = 1.0 if i % 5 == 0 else 0.0
-    touching = np.zeros(len(pair_body), np.bool_)
+    touching = np.zeros(len(pairs), np.bool_)
     s = np.empty((4, 6))
     w = np.empty(4)
     out = np.empty(8)
-    for i in range(len(pair_body)):
-        b = pair_body[i]
-        o = pair_obstacle[i]
-        node = links.index[b, NODE] if links.index[b, NODE] >= 0 else root
+    for i in range(len(pairs)):
+        b = pairs[i, 0]
+        o = pairs[i, 1]
+        node = links.ranges[b, NODE] if links.ranges[b, NODE] >= 0 else root
         balls = links.size[b, BALL] + obstacles.size[o, BALL]
         state = gjk(
-            0.0, 0.0, 1.0, e.pose, node, 1, links, b, obstacles, o, math.inf, 1e-9, ROUNDS,
-            s, w, out
+            0.0,
+            0.0,
+            1.0,
+            e.pose,
+            node,
+            1,
+            links,
+            b,
+            obstacles,
+            o,
+            math.inf,
+            1e-9,
+            ROUNDS,
+            s,
+            w,
+            out,
         )
         touching[i] = state == OVERLAP or out[4] <= balls
     return touching
