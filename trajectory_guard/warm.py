@@ -1,0 +1,41 @@
+"""Compile the kernels, or read them from their cache, before the first request comes."""
+
+import sys
+import time
+
+import numpy as np
+
+from trajectory_guard.body import ConvexBody
+from trajectory_guard.certify import judge
+from trajectory_guard.scene import Obstacle, Scene
+from trajectory_guard.trajectory import Point, Trajectory
+from trajectory_guard.urdf import robot_from_urdf
+from trajectory_guard.workcell import Workcell
+
+# Every kind of joint and solid shares the same kernels, so one of each is enough.
+_ROBOT = """
+<robot name="warm_up">
+  <link name="base"/>
+  <link name="arm"><collision><geometry><box size="1 1 1"/></geometry></collision></link>
+  <joint name="elbow" type="continuous"><parent link="base"/><child link="arm"/></joint>
+</robot>
+"""
+
+
+def warm_up() -> None:
+    """Certify a tiny motion, by the same path as every other."""
+    ball = ConvexBody(vertices=np.array([[0.0, 0.0, 2.0]]), ball=0.5)
+    workcell = Workcell(robot_from_urdf(_ROBOT), Scene((Obstacle('ball', (ball,)),), digest=''))
+    judge(workcell, Trajectory.from_points(['elbow'], [Point(0, [0.0]), Point(1, [1.0])]))
+
+
+def main() -> None:
+    """Warm up and say how long it took."""
+    print('compiling the kernels (once; about half a minute) ...', file=sys.stderr, flush=True)
+    begin = time.perf_counter()
+    warm_up()
+    print(f'kernels ready after {time.perf_counter() - begin:.1f} s', file=sys.stderr)
+
+
+if __name__ == '__main__':
+    main()
