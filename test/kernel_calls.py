@@ -36,7 +36,7 @@ def box_distance(x, y, z, solids, o):
 
 
 @entry
-def gjk(n, points, count, links, b, obstacles, o, want, accuracy, rounds, s, w, out):
+def gjk(n, points, count, links, b, obstacles, o, want, stop, accuracy, rounds, s, w, out):
     """Call the search for a direction."""
     return _gjk(
         n[0],
@@ -50,6 +50,7 @@ def gjk(n, points, count, links, b, obstacles, o, want, accuracy, rounds, s, w, 
         obstacles,
         o,
         want,
+        stop,
         accuracy,
         rounds,
         s,
@@ -59,9 +60,9 @@ def gjk(n, points, count, links, b, obstacles, o, want, accuracy, rounds, s, w, 
 
 
 @entry
-def deepest(pose, links, b, obstacles, o, basis, value, inverse, weight, moved, out):
+def deepest(pose, links, b, obstacles, o, scratch, out):
     """Call the search for a common point."""
-    return _deepest(pose, 0, links, b, obstacles, o, basis, value, inverse, weight, moved, out)
+    return _deepest(pose, 0, links, b, obstacles, o, *scratch, out)
 
 
 @entry

@@ -458,6 +458,54 @@ def test_limits_unchecked_are_said():
     assert 'joint limits were not checked' in result.warnings
 
 
+@pytest.mark.parametrize('slack', [[0.1, 0.1], [], [-0.1], [math.nan], [math.inf]], ids=str)
+def test_slack_that_does_not_fit_is_refused(slack):
+    """Found in review: a wrong shape was read out of bounds, a negative one deflated the proof."""
+    cell = slider()
+    path = joint_path(cell.robot.movable, slide(0.0, 1.0))
+    with pytest.raises(RequestError):
+        certify(cell, path, Settings(), np.array(slack))
+
+
+@pytest.mark.parametrize(
+    'change',
+    [
+        {'coefficients': np.zeros((1, 1, 4))},
+        {'coefficients': np.zeros((2, 1, 6))},
+        {'coefficients': np.full((1, 1, 6), np.nan)},
+        {'coefficient_error': np.full((1, 1), -1.0)},
+        {'coefficient_error': np.full((1, 1), np.nan)},
+        {'in_path': np.ones(2, bool)},
+        {'knots_ns': np.array([0])},
+        {'knots_ns': np.array([1, 0])},
+    ],
+    ids=str,
+)
+def test_a_path_of_the_wrong_shape_is_refused(change):
+    """Kernels take shapes on trust, so a path never has another."""
+    path = joint_path(slider().robot.movable, slide(0.0, 1.0))
+    with pytest.raises(RequestError):
+        dataclasses.replace(path, **change)
+
+
+def test_a_standing_body_within_rounding_is_one_piece():
+    """Found in review: what does not move was halved to the end of the budget."""
+    gap = 1e-9
+    cell = slider(1e6, wall=0.5 + gap / 1e6)
+    result = judge(cell, slide(0.0, 0.0), None, Settings(tolerance=1e-9))
+    assert result.verdict == Verdict.SUSPECT
+    assert result.pieces == 1
+
+
+def test_tracking_near_the_limit_needs_few_pieces():
+    """A gap just above clearance and tracking closes without cutting to the bottom."""
+    for gap in (1.5e-4, 1e-3, 1e-2):
+        settings = Settings(tolerance=1e-4, tracking_tolerance=(0.005,), clearance=0.01)
+        result = judge(slider(), slide(0.0, 2.485 - gap), None, settings)
+        assert result.verdict == Verdict.FREE
+        assert result.pieces < 100
+
+
 def test_a_path_of_another_robot_is_refused():
     """Coefficients are never applied to joints they were not made for."""
     rng = np.random.default_rng(1)

@@ -35,6 +35,12 @@ def scene(rng, apart):
     return a, b, points, solids([a], [0]), solids([b], [-1])
 
 
+def scratch():
+    """Return the scratch of the search for a common point."""
+    square, column = (4, 4), 4
+    return tuple(np.empty(n) for n in (square, column, square, column, column, (200, 4)))
+
+
 def run(points, links, obstacles):
     """Return state and output of the distance search."""
     s, w, out = np.empty((4, 6)), np.empty(4), np.empty(8)
@@ -46,7 +52,8 @@ def run(points, links, obstacles):
         0,
         obstacles,
         0,
-        math.inf,
+        0.0,
+        False,
         1e-9,
         ROUNDS,
         s,
@@ -96,11 +103,7 @@ def test_common_point_is_deep_in_both():
             0,
             obstacles,
             0,
-            np.empty((4, 4)),
-            np.empty(4),
-            np.empty((4, 8)),
-            np.empty(4),
-            np.empty((200, 4)),
+            scratch(),
             out,
         )
         state, _ = run(points, links, obstacles)
@@ -131,10 +134,6 @@ def test_no_faces_no_claim():
         0,
         obstacles,
         0,
-        np.empty((4, 4)),
-        np.empty(4),
-        np.empty((4, 8)),
-        np.empty(4),
-        np.empty((200, 4)),
+        scratch(),
         out,
     )

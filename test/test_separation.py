@@ -166,3 +166,17 @@ def test_the_box_of_a_turned_box_is_tight():
     body = box_body(size).moved(pose([1.0, 2.0, 3.0], Rotation.random(random_state=rng)))
     half = solids([body], [-1]).place[0, 6:9]
     np.testing.assert_allclose(np.sort(half), np.sort(size / 2.0), rtol=1e-9)
+
+
+@pytest.mark.parametrize('tilt', [0.0, 1e-12, 1e-9, 1e-8, 3e-8, 1e-6])
+@pytest.mark.parametrize('radius', [1e-6, 1.0, 1e5])
+def test_the_box_contains_a_disc_that_is_almost_aligned(tilt, radius):
+    """Found in review: 1 - (r.a)^2 cancels, and the box lost R times the tilt."""
+    from trajectory_guard.body import ConvexBody
+
+    axis = np.array([math.sin(tilt), 0.0, math.cos(tilt)])
+    body = ConvexBody(np.zeros((1, 3)), disc_radius=radius, disc_axis=axis)
+    packed = solids([body], [-1])
+    rim = radius * np.array([math.cos(tilt), 0.0, -math.sin(tilt)])
+    for x in (rim, -rim, np.array([0.0, radius, 0.0])):
+        assert kernel_calls.box_distance(*x, packed, 0) <= 2e-16 * radius

@@ -40,6 +40,7 @@ class JointPath:
         for the value at every s as well [rad or m].
     :param unknown_until_ns: before this time no start state tells where the arm is [ns].
     :param limits_checked: whether the joint limits were enforced.
+    :raises RequestError: an array has another shape, a value is not finite, knots fall.
     """
 
     joint_names: tuple[str, ...]
@@ -51,9 +52,28 @@ class JointPath:
     limits_checked: bool
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only."""
-        for array in (self.in_path, self.knots_ns, self.coefficients, self.coefficient_error):
+        """Check shapes and values, which kernels take on trust, and make the arrays read-only."""
+        segments, n = len(self.knots_ns) - 1, len(self.joint_names)
+        for name, shape, dtype in (
+            ('in_path', (n,), np.bool_),
+            ('knots_ns', (segments + 1,), np.int64),
+            ('coefficients', (segments, n, 6), np.float64),
+            ('coefficient_error', (segments, n), np.float64),
+        ):
+            array = np.ascontiguousarray(getattr(self, name), dtype)
+            if array.shape != shape or segments < 1:
+                raise RequestError(
+                    Reason.INVALID_PARAMETER,
+                    f'{name} must have shape {shape} with S >= 1, got {array.shape}',
+                )
             array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        if not (np.diff(self.knots_ns) >= 0).all() or self.knots_ns[0] < 0:
+            raise RequestError(Reason.UNSORTED_TIMES, f'knots_ns must rise, got {self.knots_ns}')
+        if not (np.isfinite(self.coefficients).all() and (self.coefficient_error >= 0.0).all()):
+            raise RequestError(
+                Reason.NOT_FINITE, 'coefficients must be finite and coefficient_error >= 0'
+            )
 
     @property
     def duration_ns(self) -> int:

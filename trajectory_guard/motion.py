@@ -80,8 +80,8 @@ def rational_motion(
     :param level: its power of two.
     :param slack: (n,) tracking tolerance per movable joint; none if None.
     :param builder: how; an economised motion is a polynomial, its weights are the binomials.
-    :raises RequestError: the path is another robot's, the piece does not exist, the body does not move, or the joints turn too
-        far in the piece for positive weights.
+    :raises RequestError: the path is another robot's, the piece does not exist, the body does not
+        move, or the joints turn too far in the piece for positive weights.
     """
     if not (0 <= segment < len(path.coefficients) and 0 <= numerator < 2**level <= 2**48):
         raise RequestError(

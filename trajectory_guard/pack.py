@@ -50,8 +50,9 @@ def solids(bodies: Sequence[ConvexBody], nodes: Sequence[int]) -> Solids:
 
 
 def perpendicular(body: ConvexBody) -> float:
-    """Return a bound on the distance of a body's core from the z axis of its frame [m]."""
-    return float((np.hypot(*body.vertices[:, :2].T).max() + body.disc_radius) * UP)
+    """Return a bound on the distance of a body's core and centre from its frame's z axis [m]."""
+    core = np.hypot(*body.vertices[:, :2].T).max() + body.disc_radius
+    return float(max(core, np.hypot(*body.center[:2])) * UP)
 
 
 def _farthest(body: ConvexBody, point: np.ndarray) -> float:
@@ -70,7 +71,9 @@ def _box(body: ConvexBody) -> tuple[np.ndarray, np.ndarray]:
     best: tuple[float, np.ndarray, np.ndarray, np.ndarray] | None = None
     for R in _frames(body):
         local = body.vertices @ R
-        reach = body.disc_radius * np.sqrt(np.maximum(0.0, 1.0 - (body.disc_axis @ R) ** 2))
+        # |r - (r.a) a| for every box axis r; 1 - (r.a)^2 would cancel where they are parallel.
+        across = R - np.outer(body.disc_axis, body.disc_axis @ R)
+        reach = body.disc_radius * np.linalg.norm(across, axis=0)
         low, high = local.min(axis=0) - reach, local.max(axis=0) + reach
         scale = 1e-3 * float((high - low).max())
         volume = float(np.prod(high - low + scale))

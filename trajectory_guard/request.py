@@ -84,8 +84,9 @@ def motion_path(workcell: Workcell, path: JointPath, slack: np.ndarray) -> Path:
     :param slack: (n,) tracking tolerance per movable joint [rad or m].
     :raises RequestError: the path leaves the range of the kernels.
     """
+    _check_slack(slack, len(path.joint_names))
     size = np.abs(path.coefficients).sum(axis=2).max(axis=0) + path.coefficient_error.max(axis=0)
-    if not (np.isfinite(size).all() and (size <= LARGEST).all() and np.isfinite(slack).all()):
+    if not (size <= LARGEST).all():
         worst = int(np.argmax(~(size <= LARGEST)))
         raise RequestError(
             Reason.TOO_LARGE,
@@ -114,3 +115,16 @@ def motion_path(workcell: Workcell, path: JointPath, slack: np.ndarray) -> Path:
         rho=rho,
         reach=reach,
     )
+
+
+def _check_slack(slack: np.ndarray, joints: int) -> None:
+    """Refuse a tracking tolerance that kernels would read out of bounds or that would deflate."""
+    if slack.shape != (joints,) or slack.dtype != np.float64 or not slack.flags.c_contiguous:
+        raise RequestError(
+            Reason.INVALID_TRACKING_TOLERANCE,
+            f'slack must be {joints} doubles, got {slack.dtype} of shape {slack.shape}',
+        )
+    if not ((slack >= 0.0) & (slack <= LARGEST)).all():
+        raise RequestError(
+            Reason.INVALID_TRACKING_TOLERANCE, f'slack must lie in [0, {LARGEST:g}], got {slack}'
+        )

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from trajectory_guard.errors import Reason, RobotError, SceneError
+from trajectory_guard.kernels.margin import UP
 from trajectory_guard.kernels.solids import FAR, NODE, Solids
 from trajectory_guard.pack import perpendicular, solids
 from trajectory_guard.robot import Robot
@@ -86,7 +87,9 @@ class Workcell:
         keep('link_names', tuple(names))
         keep('obstacle_names', tuple(obstacle_names))
         keep('link_nodes', self.links.ranges[:, NODE].copy())
-        keep('extent', self.links.size[:, FAR].copy())
+        # The culls move a body's centre, which may lie farther out than its vertices.
+        out = np.array([np.linalg.norm(body.center) for body in bodies]) * UP
+        keep('extent', np.maximum(self.links.size[:, FAR], out))
         keep('perpendicular', np.array([perpendicular(body) for body in bodies]))
         keep('offsets', np.array([folded.link_path[name] for name in names]))
         keep('robot_hash', self.robot.digest())

@@ -21,6 +21,10 @@ from trajectory_guard.kernels.piece import FIT
 REVOLUTE = 0
 PRISMATIC = 1
 POSE = 12
+# A cubic's Bernstein coefficients exceed its largest value by less than this (25/16).
+SLIDE_GROWTH = 2.0
+# A weight much smaller than its columns would carry a relative error that no margin counts.
+LARGEST_RATIO = 4.0
 
 
 class Chain(NamedTuple):
@@ -120,7 +124,7 @@ def factors(kind, u, j, cosine, sine, weight):
         weight[1] = 3.0
         weight[2] = 3.0
         weight[3] = 1.0
-        return FIT, 1.0
+        return FIT, SLIDE_GROWTH
     ones = (1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0)
     for i in range(7):
         weight[i] = 0.0
@@ -138,7 +142,7 @@ def factors(kind, u, j, cosine, sine, weight):
         cosine[i] = ones[i] - square
         weight[i] = ones[i] + square
         ratio = (abs(cosine[i]) + abs(sine[i])) / weight[i]
-        if not (weight[i] > 0.0 and ratio < 1e3):
+        if not (weight[i] > 0.0 and ratio < LARGEST_RATIO):
             return 6, math.inf
         kappa = max(kappa, ratio)
     return 6, kappa
@@ -261,7 +265,7 @@ def divide(j, controls, count, points):
     sound = True
     for i in range(count[j]):
         w = controls[j, i, POSE]
-        if not w > 0.0:
+        if not (w > 0.0 and w < math.inf):
             sound = False
         inverse = 1.0 / w
         for e in range(POSE):

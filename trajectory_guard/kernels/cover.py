@@ -84,7 +84,8 @@ def _witness(depth, linear):
 @kernel
 def _swap(live, way, i, k):
     """Swap two open pairs."""
-    live[i, 0], live[k, 0] = live[k, 0], live[i, 0]
+    for c in range(2):
+        live[i, c], live[k, c] = live[k, c], live[i, c]
     for c in range(3):
         way[i, c], way[k, c] = way[k, c], way[i, c]
 
@@ -123,13 +124,27 @@ def _try_pairs(
         b = pairs[live[i, 0], 0]
         o = pairs[live[i, 0], 1]
         outcome = examine(
-            chain, links, obstacles, path, b, o, i, tolerance, clearance, e, body, way, work, known
+            chain,
+            links,
+            obstacles,
+            path,
+            (b, o),
+            tolerance,
+            clearance,
+            e,
+            body,
+            live,
+            way,
+            i,
+            work,
+            known,
         )
         if outcome == CLOSED:
             continue
-        settled = deep or _settled(
-            known, (clearance + body[b, SLACK]) * UP, body[b, SWEEP], tolerance
-        )
+        limit = (clearance + body[b, SLACK]) * UP
+        # A body that stands in this piece stands in both halves.
+        still = body[b, SWEEP] == 0.0
+        settled = deep or still or _settled(known, limit, body[b, SWEEP], tolerance)
         nearer = status != SUSPECT or known[leaf.UPPER] < worst[leaf.UPPER]
         if outcome == OVERLAPS or (settled and nearer):
             status = COLLISION if outcome == OVERLAPS else SUSPECT
@@ -141,7 +156,8 @@ def _try_pairs(
             return COLLISION, kept
         if kept < i:
             _swap(live, way, kept, i)
-        if known[leaf.UPPER] < 0.0:
+        live[kept, 1] = known[leaf.UPPER] < 0.0
+        if live[kept, 1]:
             # What overlaps at the centre is likely to overlap in a half: let it be tried first.
             _swap(live, way, first, kept)
         kept += 1
@@ -171,7 +187,14 @@ def _scratch(obstacles):
     faces = 1
     for o in range(len(obstacles.ranges)):
         faces = max(faces, obstacles.ranges[o, FACE_LAST] - obstacles.ranges[o, FACE_FIRST])
-    lp = (np.empty((4, 4)), np.empty(4), np.empty((4, 8)), np.empty(4), np.empty((faces, 4)))
+    lp = (
+        np.empty((4, 4)),
+        np.empty(4),
+        np.empty((4, 4)),
+        np.empty(4),
+        np.empty(4),
+        np.empty((faces, 4)),
+    )
     return np.empty((4, 6)), np.empty(4), np.empty(8), np.zeros(9), lp
 
 
@@ -204,7 +227,7 @@ def cover(chain, links, obstacles, path, pairs, tolerance, clearance, max_pieces
     e = enclosure(len(chain.parent), _longest(chain, path), builder)
     body = np.empty((len(links.ranges), BODY_COLUMNS))
     # Open pairs of the pieces on the stack, end to end; both halves of a piece share its rows.
-    live = np.empty((4 * len(pairs) + 16, 1), np.int64)
+    live = np.zeros((4 * len(pairs) + 16, 2), np.int64)
     way = np.zeros((4 * len(pairs) + 16, 3))
     for i in range(len(pairs)):
         live[i, 0] = i
@@ -297,7 +320,11 @@ def cover(chain, links, obstacles, path, pairs, tolerance, clearance, max_pieces
                 _push(stack, height + 1, 2 * k, level + 1, last, top)
                 height += 2
                 continue
-            reason = leaf.BY_DEPTH if level >= DEEPEST_LEVEL else leaf.BY_TOLERANCE
+            reason = leaf.BY_TOLERANCE
+            if status == SUSPECT and not (
+                worst[leaf.UPPER] <= (clearance + body[named[0], SLACK]) * UP + tolerance
+            ):
+                reason = leaf.BY_DEPTH
             write(
                 ints,
                 floats,
@@ -306,7 +333,7 @@ def cover(chain, links, obstacles, path, pairs, tolerance, clearance, max_pieces
                 k,
                 level,
                 status,
-                reason if status == SUSPECT else leaf.BY_TOLERANCE,
+                reason,
                 named[0],
                 named[1],
                 worst,

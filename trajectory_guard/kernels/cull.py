@@ -51,6 +51,7 @@ def farthest(x, y, z, px, py, pz, points, node, count):
 def _copy(live, way, source, target):
     """Copy an open pair and its direction."""
     live[target, 0] = live[source, 0]
+    live[target, 1] = live[source, 1]
     for k in range(3):
         way[target, k] = way[source, k]
 
@@ -98,7 +99,7 @@ def swept_spheres(
 
     :param pairs: (P, 2) int64: body and obstacle of every pair.
     :param body: (B, 10) out, for bodies with an open pair.
-    :param live: (N, 1) int64 open pairs, rows ``first:last``; way (N, 3) their directions.
+    :param live: (N, 2) int64 open pairs, rows ``first:last``; way (N, 3) their directions.
     """
     for i in range(first, last):
         body[pairs[live[i, 0], 0], SWEEP] = UNKNOWN

@@ -17,46 +17,33 @@ PIVOTS = 60
 
 
 @kernel
-def _artificial(basis, value, cx, cy, cz, far):
-    """Start from a regular tetrahedron around the solid, multipliers 1/4 each."""
+def _artificial(basis, value, inverse, cx, cy, cz, far):
+    """
+    Start from a regular tetrahedron around the solid, multipliers 1/4 each.
+
+    The rows (n, 1) with n the corners of a cube over sqrt(3) are orthogonal; their inverse is known.
+    """
     root = 1.0 / math.sqrt(3.0)
     for k in range(4):
-        ax = root if k == 0 or k == 3 else -root
-        ay = root if k == 0 or k == 2 else -root
-        az = root if k == 0 or k == 1 else -root
-        basis[k, 0] = ax
-        basis[k, 1] = ay
-        basis[k, 2] = az
+        basis[k, 0] = root if k in (0, 3) else -root
+        basis[k, 1] = root if k in (0, 2) else -root
+        basis[k, 2] = root if k in (0, 1) else -root
         basis[k, 3] = 1.0
-        value[k] = far + ax * cx + ay * cy + az * cz
+        value[k] = far + basis[k, 0] * cx + basis[k, 1] * cy + basis[k, 2] * cz
+        for m in range(3):
+            inverse[m, k] = 0.75 * basis[k, m]
+        inverse[3, k] = 0.25
 
 
 @kernel
-def _invert(basis, inverse):
-    """Write the inverse of a 4x4 matrix by Gauss-Jordan with pivoting; False if singular."""
-    for i in range(4):
-        for k in range(4):
-            inverse[i, k] = basis[i, k]
-            inverse[i, 4 + k] = 1.0 if i == k else 0.0
-    for c in range(4):
-        pivot = c
-        for i in range(c + 1, 4):
-            if abs(inverse[i, c]) > abs(inverse[pivot, c]):
-                pivot = i
-        if not abs(inverse[pivot, c]) > 1e-13:
-            return False
-        if pivot != c:
-            for k in range(8):
-                inverse[c, k], inverse[pivot, k] = inverse[pivot, k], inverse[c, k]
-        scale = 1.0 / inverse[c, c]
-        for k in range(8):
-            inverse[c, k] *= scale
-        for i in range(4):
-            if i != c:
-                factor = inverse[i, c]
-                for k in range(8):
-                    inverse[i, k] -= factor * inverse[c, k]
-    return True
+def _exchange(inverse, share, leave):
+    """Update the inverse when row ``leave`` of the basis becomes the row with these shares."""
+    for m in range(4):
+        inverse[m, leave] /= share[leave]
+    for k in range(4):
+        if k != leave:
+            for m in range(4):
+                inverse[m, k] -= share[k] * inverse[m, leave]
 
 
 @kernel
@@ -76,12 +63,12 @@ def depth(faces, first, last, x, y, z):
 
 
 @kernel
-def deepest(pose, node, links, b, obstacles, o, basis, value, inverse, weight, moved, out):
+def deepest(pose, node, links, b, obstacles, o, basis, value, inverse, weight, shares, moved, out):
     """
     Propose a point deep inside a link and an obstacle at one instant.
 
     :param pose: (n, 1, 12) pose of the nodes at the instant.
-    :param basis: (4, 4), value (4,), inverse (4, 8), weight (4,) scratch.
+    :param basis: (4, 4), value (4,), inverse (4, 4), weight (4,), shares (4,) scratch.
     :param moved: (F, 4) scratch for the obstacle's faces in the node frame.
     :param out: (6,) out: point in the node frame [m], then the direction from the obstacle towards
         the link in the root frame that separates them soonest (zero if none).
@@ -111,6 +98,7 @@ def deepest(pose, node, links, b, obstacles, o, basis, value, inverse, weight, m
     _artificial(
         basis,
         value,
+        inverse,
         links.place[b, CENTRE],
         links.place[b, CENTRE + 1],
         links.place[b, CENTRE + 2],
@@ -121,14 +109,12 @@ def deepest(pose, node, links, b, obstacles, o, basis, value, inverse, weight, m
     mine = (0, 0, 0, 0)  # which basis rows are faces of the link
     x = y = z = t = 0.0
     for _ in range(PIVOTS):
-        if not _invert(basis, inverse):
-            break
         x = y = z = t = 0.0
         for k in range(4):
-            x += inverse[0, 4 + k] * value[k]
-            y += inverse[1, 4 + k] * value[k]
-            z += inverse[2, 4 + k] * value[k]
-            t += inverse[3, 4 + k] * value[k]
+            x += inverse[0, k] * value[k]
+            y += inverse[1, k] * value[k]
+            z += inverse[2, k] * value[k]
+            t += inverse[3, k] * value[k]
         worst = tiny
         which = -1
         for f in range(first, last):
@@ -154,21 +140,17 @@ def deepest(pose, node, links, b, obstacles, o, basis, value, inverse, weight, m
         leave = -1
         ratio = math.inf
         for k in range(4):
-            share = (
-                ax * inverse[0, 4 + k]
-                + ay * inverse[1, 4 + k]
-                + az * inverse[2, 4 + k]
-                + inverse[3, 4 + k]
-            )
-            inverse[k, 0] = share
+            share = ax * inverse[0, k] + ay * inverse[1, k] + az * inverse[2, k] + inverse[3, k]
+            shares[k] = share
             if share > 1e-12 and weight[k] / share < ratio:
                 ratio = weight[k] / share
                 leave = k
         if leave < 0:
             break
         for k in range(4):
-            weight[k] -= ratio * inverse[k, 0]
+            weight[k] -= ratio * shares[k]
         weight[leave] = ratio
+        _exchange(inverse, shares, leave)
         basis[leave, 0] = ax
         basis[leave, 1] = ay
         basis[leave, 2] = az

@@ -14,7 +14,7 @@ from trajectory_guard.kernels.jit import kernel
 from trajectory_guard.kernels.separation import highest, lowest
 from trajectory_guard.kernels.solids import AXIS, CORE, DISC, FAR, FIRST, LAST
 
-RELATIVE = 0.02  # a direction this close to the best one is as good
+RELATIVE = 0.02  # far from what is wanted, a nearly best direction is as good
 ROUNDS = 40  # enough for the distance of two polytopes; more is rounding
 SEPARATED = 0
 OVERLAP = 1
@@ -204,16 +204,33 @@ def _vertex(nx, ny, nz, points, node, i, links, b, obstacles, o, s, k):
 
 @kernel
 def gjk(
-    nx, ny, nz, points, node, count, links, b, obstacles, o, want, accuracy, rounds, s, w, out
+    nx,
+    ny,
+    nz,
+    points,
+    node,
+    count,
+    links,
+    b,
+    obstacles,
+    o,
+    want,
+    stop,
+    accuracy,
+    rounds,
+    s,
+    w,
+    out,
 ):
     """
     Propose a direction that separates a link's images from an obstacle.
 
     :param nx: first direction to try, from the obstacle towards the link, unit length.
     :param points: (n, K, 12) poses; the first ``count`` of ``node`` are used.
-    :param want: stop as soon as a direction's support difference exceeds this [m].
-    :param accuracy: stop when distance and bound differ by less than this and a fraction of the
-        distance [m].
+    :param want: support difference that a direction should exceed [m].
+    :param stop: stop as soon as one does, or when none can; else find the distance.
+    :param accuracy: stop when distance and bound differ by less than this [m] and a fraction of
+        the distance to ``want``.
     :param rounds: largest number of support points.
     :param s: (4, 6) scratch, simplex: differences and obstacle points.
     :param w: (4,) scratch.
@@ -233,9 +250,9 @@ def gjk(
             out[1] = ny
             out[2] = nz
             out[3] = best
-            if best > want:
+            if stop and best > want:
                 return REACHED
-        if n > 0 and out[4] - best <= accuracy + RELATIVE * out[4]:
+        if n > 0 and out[4] - best <= accuracy + RELATIVE * abs(out[4] - want):
             return SEPARATED
         _vertex(nx, ny, nz, points, node, i, links, b, obstacles, o, s, n)
         n += 1
@@ -271,7 +288,7 @@ def gjk(
         out[7] = pz
         if n == 4 or length <= 1e-14 * (obstacles.size[o, FAR] + links.size[b, CORE]):
             return OVERLAP
-        if length <= want < math.inf:
+        if stop and length <= want:
             return SEPARATED  # no direction can do it
         nx = x / length
         ny = y / length

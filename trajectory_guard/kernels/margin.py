@@ -18,7 +18,9 @@ division by the weight the image of a point x differs from the exact one by at m
 
     CHAIN * (depth + 1) * u * kappa * reach,         CHAIN = 256,
 
-where ``reach`` bounds the sum of the lengths of all offsets of the chain and |x|.
+where ``reach`` bounds the sum of the lengths of all offsets of the chain and |x|, and the ratios
+are limited (``chain.LARGEST_RATIO``, ``SLIDE_GROWTH``), so that no weight is small against its
+columns.
 
 **Separating plane** (``separation``).  With |n| <= 1 + 4u, the products n.(C x) (two nested dot
 products of length 3 and 4) and n.p (length 3), the disc term and the comparison add at most

@@ -75,7 +75,9 @@ def _common_point(links, b, obstacles, o, e, error, fuzz, margin, lp, found, kno
     :returns: OVERLAPS or OPEN; ``found[3:6]`` then holds a direction or zeros.
     """
     node = links.ranges[b, NODE]
-    if not deepest(e.pose, node, links, b, obstacles, o, lp[0], lp[1], lp[2], lp[3], lp[4], found):
+    if not deepest(
+        e.pose, node, links, b, obstacles, o, lp[0], lp[1], lp[2], lp[3], lp[4], lp[5], found
+    ):
         return OPEN
     mine = depth(
         links.faces,
@@ -112,6 +114,8 @@ def _common_point(links, b, obstacles, o, e, error, fuzz, margin, lp, found, kno
     moved = farthest(
         found[0], found[1], found[2], found[6], found[7], found[8], e.points, node, e.number[node]
     )
+    # The point may lie off the core, within the ball: a linear part that is no rotation moves it.
+    error += e.eps[node] * links.size[b, BALL]
     if moved + error + 2.0 * margin < mine + theirs:
         return OVERLAPS
     return OPEN
@@ -119,111 +123,68 @@ def _common_point(links, b, obstacles, o, e, error, fuzz, margin, lp, found, kno
 
 @kernel
 def examine(
-    chain, links, obstacles, path, b, o, i, tolerance, clearance, e, body, way, work, known
+    chain, links, obstacles, path, pair, tolerance, clearance, e, body, live, way, i, work, known
 ):
     """
     Try to close one pair on the piece.
 
-    :param i: row of ``way``: the direction inherited, replaced by the best one found.
+    :param pair: body and obstacle.
+    :param live: (N, 2) int64; column 1 of row ``i``: the pair overlapped at the parent's centre.
+    :param way: (N, 3); row ``i``: the direction inherited, replaced by the best one found.
     :param work: scratch of ``gjk`` (4, 6), (4,), (8,), of the common point (9,), of ``deepest`` (a
         tuple).
     :param known: (7,) out, see ``leaf``.
     :returns: CLOSED, OVERLAPS or OPEN.
     """
+    b, o = pair
     s, w, out, found, lp = work
     node = links.ranges[b, NODE]
-    reach = path.reach[b]
-    depth_ = float(chain.depth[node])
+    sound = e.sound[node]
     fuzz = body[b, FUZZ]
     error = body[b, ERROR]
-    kappa = e.kappa[node]
-    count = e.number[node]
-    limit = (clearance + body[b, SLACK]) * UP
     balls = links.size[b, BALL] + obstacles.size[o, BALL]
-    margin = chain_margin(depth_, kappa, reach) + sphere_margin(reach, obstacles.size[o, FAR])
+    limit = (clearance + body[b, SLACK]) * UP
+    scale = (error, float(chain.depth[node]), e.kappa[node], path.reach[b])
+    moving = (e.points, node, e.number[node], links, b, obstacles, o)
+    standing = (e.pose, node, 1, links, b, obstacles, o)
+    margin = chain_margin(scale[1], scale[2], scale[3])
+    margin += sphere_margin(scale[3], obstacles.size[o, FAR])
+    want = limit + allowance(links, b, obstacles, o, *scale)
     accuracy = ACCURACY * tolerance
     known[LOWER] = -math.inf
+    known[UPPER] = math.inf
     known[DEPTH] = 0.0
     known[NEAR] = math.inf
     nx, ny, nz = _first_direction(way, i, body, b, obstacles, o)
-    if e.sound[node]:
+    if sound and live[i, 1] == 0:
         # Most pairs are closed here, and most of them by the first direction.
-        want = limit + allowance(links, b, obstacles, o, error, depth_, kappa, reach)
-        gjk(
-            nx,
-            ny,
-            nz,
-            e.points,
-            node,
-            count,
-            links,
-            b,
-            obstacles,
-            o,
-            want,
-            accuracy,
-            SWEPT_ROUNDS,
-            s,
-            w,
-            out,
-        )
+        gjk(nx, ny, nz, *moving, want, True, accuracy, SWEPT_ROUNDS, s, w, out)
         nx = out[0]
         ny = out[1]
         nz = out[2]
-        lower = separation(
-            nx, ny, nz, e.points, node, count, links, b, obstacles, o, error, depth_, kappa, reach
-        )
-        _keep(way, i, nx, ny, nz, lower, known)
-        if lower > limit:
+        _keep(way, i, nx, ny, nz, separation(nx, ny, nz, *moving, *scale), known)
+        if known[LOWER] > limit:
             return CLOSED
-    state = gjk(
-        nx, ny, nz, e.pose, node, 1, links, b, obstacles, o, math.inf, accuracy, ROUNDS, s, w, out
-    )
+    state = gjk(nx, ny, nz, *standing, want, False, accuracy, ROUNDS, s, w, out)
     known[UPPER] = out[4] - balls + fuzz + margin
     known[X] = out[5]
     known[Y] = out[6]
     known[Z] = out[7]
-    if state != OVERLAP and e.sound[node]:
+    if sound and state != OVERLAP:
         _near(out, balls, e, node, error + margin, known)
-        lower = separation(
-            out[0],
-            out[1],
-            out[2],
-            e.points,
-            node,
-            count,
-            links,
-            b,
-            obstacles,
-            o,
-            error,
-            depth_,
-            kappa,
-            reach,
-        )
-        _keep(way, i, out[0], out[1], out[2], lower, known)
-        if lower > limit:
+        nx = out[0]
+        ny = out[1]
+        nz = out[2]
+        _keep(way, i, nx, ny, nz, separation(nx, ny, nz, *moving, *scale), known)
+        if known[LOWER] > limit:
             return CLOSED
     if known[UPPER] <= fuzz + margin:
         overlap = _common_point(links, b, obstacles, o, e, error, fuzz, margin, lp, found, known)
         if overlap == OVERLAPS:
             return OVERLAPS
-        if e.sound[node] and (found[3] != 0.0 or found[4] != 0.0 or found[5] != 0.0):
-            lower = separation(
-                found[3],
-                found[4],
-                found[5],
-                e.points,
-                node,
-                count,
-                links,
-                b,
-                obstacles,
-                o,
-                error,
-                depth_,
-                kappa,
-                reach,
-            )
-            _keep(way, i, found[3], found[4], found[5], lower, known)
+        nx = found[3]
+        ny = found[4]
+        nz = found[5]
+        if sound and (nx != 0.0 or ny != 0.0 or nz != 0.0):
+            _keep(way, i, nx, ny, nz, separation(nx, ny, nz, *moving, *scale), known)
     return OPEN

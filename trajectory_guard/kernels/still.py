@@ -1,7 +1,5 @@
 """Pairs that no joint of a request moves: which touch where they stand (for a warning)."""
 
-import math
-
 import numpy as np
 
 from trajectory_guard.kernels.enclosure import centre, enclosure, RATIONAL
@@ -50,7 +48,8 @@ def overlaps(chain, links, obstacles, path, pairs):
             b,
             obstacles,
             o,
-            math.inf,
+            balls,
+            False,
             1e-9,
             ROUNDS,
             s,
