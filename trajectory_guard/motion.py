@@ -101,8 +101,6 @@ def rational_motion(
         half,
         int(builder),
     )
-    if builder == Builder.ECONOMISED:
-        weights *= [math.comb(len(weights) - 1, i) for i in range(len(weights))]
     if not (sound and math.isfinite(error)):
         raise RequestError(
             Reason.INVALID_PARAMETER, f'piece {numerator}/2^{level} turns too far for one motion'

@@ -254,11 +254,11 @@ def extend(chain, j, moving, u, local, controls, count, kappa, scratch, cosine, 
 
 
 @kernel
-def divide(j, controls, count, points):
+def divide(j, controls, count, points, weights):
     """
     Divide the control matrices of a node by their weights.
 
-    :param points: (n, K, 12) out: C_i / w_i.
+    :param points: (n, K, 12) out: C_i / w_i; weights (n, K) out: w_i, scaled.
     :returns: True if every weight is positive and every entry finite.
     """
     total = 0.0
@@ -267,6 +267,7 @@ def divide(j, controls, count, points):
         w = controls[j, i, POSE]
         if not (w > 0.0 and w < math.inf):
             sound = False
+        weights[j, i] = w
         inverse = 1.0 / w
         for e in range(POSE):
             value = controls[j, i, e] * inverse

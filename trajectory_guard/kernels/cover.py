@@ -20,6 +20,7 @@ import math
 import numpy as np
 
 from trajectory_guard.kernels import leaf
+from trajectory_guard.kernels.chain import POSE
 from trajectory_guard.kernels.cull import (
     BODY_COLUMNS,
     hopeless,
@@ -33,8 +34,9 @@ from trajectory_guard.kernels.enclosure import build, centre, enclosure, fit
 from trajectory_guard.kernels.jit import entry, kernel
 from trajectory_guard.kernels.leaf import COLLISION, FREE, grown, SUSPECT, write
 from trajectory_guard.kernels.margin import UP
-from trajectory_guard.kernels.pair import CLOSED, examine, OVERLAPS
+from trajectory_guard.kernels.pair import CLOSED, examine
 from trajectory_guard.kernels.solids import FACE_FIRST, FACE_LAST, NODE
+from trajectory_guard.kernels.witness import OVERLAPS
 
 DEEPEST_LEVEL = 48  # times are exact dyadic numbers in a double up to here
 FINEST_WITNESS = 12
@@ -195,7 +197,8 @@ def _scratch(obstacles):
         np.empty(4),
         np.empty((faces, 4)),
     )
-    return np.empty((4, 6)), np.empty(4), np.empty(8), np.zeros(9), lp
+    search = (lp, np.empty((1, 1, POSE)), np.zeros(11), np.zeros(11), np.zeros(11))
+    return np.empty((4, 6)), np.empty(4), np.empty(8), search
 
 
 @kernel

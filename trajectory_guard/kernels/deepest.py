@@ -21,7 +21,7 @@ def _artificial(basis, value, inverse, cx, cy, cz, far):
     """
     Start from a regular tetrahedron around the solid, multipliers 1/4 each.
 
-    The rows (n, 1) with n the corners of a cube over sqrt(3) are orthogonal; their inverse is known.
+    The rows (n, 1), n corners of a cube over sqrt(3), are orthogonal: their inverse is known.
     """
     root = 1.0 / math.sqrt(3.0)
     for k in range(4):

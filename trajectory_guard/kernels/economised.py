@@ -74,6 +74,7 @@ def _bernstein() -> np.ndarray:
 
 
 BERNSTEIN = _bernstein()
+BINOMIALS = np.array([float(math.comb(CONTROLS - 1, i)) for i in range(CONTROLS)])
 
 
 @kernel
@@ -348,16 +349,18 @@ def extend_economised(chain, j, span, d, local, powers, fit, eps, size, kappa, q
 
 
 @kernel
-def control_points(j, powers, points):
+def control_points(j, powers, points, weights):
     """
     Write the control points of a node's polynomial pose.
 
     :param powers: (n, 12, 6) power coefficients.
-    :param points: (n, 13, 12) out: Bernstein coefficients of degree 12, weights 1.
+    :param points: (n, 13, 12) out: Bernstein coefficients of degree 12.
+    :param weights: (n, 13) out: the binomials, scaled weights of a polynomial.
     :returns: True if every entry is finite.
     """
     total = 0.0
     for i in range(CONTROLS):
+        weights[j, i] = BINOMIALS[i]
         for e in range(POSE):
             value = powers[j, e, 0]
             for k in range(1, TERMS):

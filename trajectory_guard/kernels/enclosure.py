@@ -69,6 +69,7 @@ class Enclosure(NamedTuple):
     local, pose (n, 1, 12): poses at the centre, in the parent's and in the root frame.
     controls (n, K, 13), points (n, K, 12): control matrices, and the same over their weights.
     number (n,), kappa (n,), sound (n,): their number, column bound, and whether they are usable.
+    weights (n, K): scaled Bernstein weights of the control points.
     needed (n,) bool: nodes with an open pair at or beyond them.
     power (16,), cosine, sine, weight (7,), scratch (K, 13): scratch.
     powers (n, 12, 6), eps (n,), size (n,): polynomial poses, see ``economised``; column (12, 6):
@@ -87,6 +88,7 @@ class Enclosure(NamedTuple):
     number: np.ndarray
     kappa: np.ndarray
     sound: np.ndarray
+    weights: np.ndarray
     needed: np.ndarray
     power: np.ndarray
     cosine: np.ndarray
@@ -124,6 +126,7 @@ def enclosure(nodes, longest, builder):
         np.zeros(nodes, np.int64),
         np.ones(nodes),
         np.zeros(nodes, np.bool_),
+        np.empty((nodes, shown)),
         np.zeros(nodes, np.bool_),
         np.empty(POWERS),
         np.empty(width),
@@ -190,7 +193,7 @@ def build(chain, e, builder):
             continue
         if builder == ECONOMISED:
             e.number[j] = CONTROLS
-            e.sound[j] = control_points(j, e.powers, e.points)
+            e.sound[j] = control_points(j, e.powers, e.points, e.weights)
         else:
             extend(
                 chain,
@@ -206,7 +209,7 @@ def build(chain, e, builder):
                 e.sine,
                 e.weight,
             )
-            e.sound[j] = divide(j, e.controls, e.number, e.points)
+            e.sound[j] = divide(j, e.controls, e.number, e.points, e.weights)
         e.sound[j] = e.sound[j] and e.kappa[j] < math.inf
 
 

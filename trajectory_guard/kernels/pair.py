@@ -8,17 +8,15 @@ deeper than its motion proves an overlap.  Everything else chooses what they are
 import math
 
 from trajectory_guard.kernels.cull import ERROR, farthest, FUZZ, PLACE, SLACK
-from trajectory_guard.kernels.deepest import deepest, depth
 from trajectory_guard.kernels.gjk import gjk, OVERLAP, ROUNDS
 from trajectory_guard.kernels.jit import kernel
 from trajectory_guard.kernels.leaf import DEPTH, LOWER, NEAR, UPPER, X, Y, Z
 from trajectory_guard.kernels.margin import chain_margin, sphere_margin, UP
 from trajectory_guard.kernels.separation import allowance, box_direction, separation
-from trajectory_guard.kernels.solids import BALL, FACE_FIRST, FACE_LAST, FAR, NODE
+from trajectory_guard.kernels.solids import BALL, FAR, NODE
+from trajectory_guard.kernels.witness import common_point, OPEN, OVERLAPS
 
 CLOSED = 0
-OPEN = 1
-OVERLAPS = 2  # at every instant of the piece
 
 SWEPT_ROUNDS = 12  # a direction for a whole piece comes soon, or the piece is too long
 ACCURACY = 0.02  # of the tolerance, for distances at the centre
@@ -64,64 +62,6 @@ def _near(out, balls, e, node, error, known):
 
 
 @kernel
-def _common_point(links, b, obstacles, o, e, error, fuzz, margin, lp, found, known):
-    """
-    Look for a common point at the centre and prove an overlap of the whole piece from it.
-
-    The balls around the point, inside the link and inside the obstacle, overlap as long as the
-    link's point has moved by less than the sum of their radii.
-
-    :param known: UPPER, X, Y, Z and DEPTH are written when the point is proved.
-    :returns: OVERLAPS or OPEN; ``found[3:6]`` then holds a direction or zeros.
-    """
-    node = links.ranges[b, NODE]
-    if not deepest(
-        e.pose, node, links, b, obstacles, o, lp[0], lp[1], lp[2], lp[3], lp[4], lp[5], found
-    ):
-        return OPEN
-    mine = depth(
-        links.faces,
-        links.ranges[b, FACE_FIRST],
-        links.ranges[b, FACE_LAST],
-        found[0],
-        found[1],
-        found[2],
-    )
-    for r in range(3):
-        found[6 + r] = (
-            e.pose[node, 0, 4 * r] * found[0]
-            + e.pose[node, 0, 4 * r + 1] * found[1]
-            + e.pose[node, 0, 4 * r + 2] * found[2]
-            + e.pose[node, 0, 4 * r + 3]
-        )
-    theirs = depth(
-        obstacles.faces,
-        obstacles.ranges[o, FACE_FIRST],
-        obstacles.ranges[o, FACE_LAST],
-        found[6],
-        found[7],
-        found[8],
-    )
-    if not (mine > fuzz + margin and theirs > margin):
-        return OPEN
-    known[X] = found[6]
-    known[Y] = found[7]
-    known[Z] = found[8]
-    known[DEPTH] = mine + theirs - fuzz - 2.0 * margin
-    known[UPPER] = -known[DEPTH]
-    if not e.sound[node]:
-        return OPEN
-    moved = farthest(
-        found[0], found[1], found[2], found[6], found[7], found[8], e.points, node, e.number[node]
-    )
-    # The point may lie off the core, within the ball: a linear part that is no rotation moves it.
-    error += e.eps[node] * links.size[b, BALL]
-    if moved + error + 2.0 * margin < mine + theirs:
-        return OVERLAPS
-    return OPEN
-
-
-@kernel
 def examine(
     chain, links, obstacles, path, pair, tolerance, clearance, e, body, live, way, i, work, known
 ):
@@ -131,13 +71,12 @@ def examine(
     :param pair: body and obstacle.
     :param live: (N, 2) int64; column 1 of row ``i``: the pair overlapped at the parent's centre.
     :param way: (N, 3); row ``i``: the direction inherited, replaced by the best one found.
-    :param work: scratch of ``gjk`` (4, 6), (4,), (8,), of the common point (9,), of ``deepest`` (a
-        tuple).
+    :param work: scratch of ``gjk`` (4, 6), (4,), (8,), and of ``witness.common_point`` (a tuple).
     :param known: (7,) out, see ``leaf``.
     :returns: CLOSED, OVERLAPS or OPEN.
     """
     b, o = pair
-    s, w, out, found, lp = work
+    s, w, out, search = work
     node = links.ranges[b, NODE]
     sound = e.sound[node]
     fuzz = body[b, FUZZ]
@@ -179,9 +118,9 @@ def examine(
         if known[LOWER] > limit:
             return CLOSED
     if known[UPPER] <= fuzz + margin:
-        overlap = _common_point(links, b, obstacles, o, e, error, fuzz, margin, lp, found, known)
-        if overlap == OVERLAPS:
+        if common_point(links, b, obstacles, o, e, error, fuzz, margin, search, known) == OVERLAPS:
             return OVERLAPS
+        found = search[2]
         nx = found[3]
         ny = found[4]
         nz = found[5]

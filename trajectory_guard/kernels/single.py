@@ -10,7 +10,6 @@ from trajectory_guard.kernels.enclosure import (
     enclosure,
     fit,
     fit_error,
-    RATIONAL,
 )
 from trajectory_guard.kernels.jit import entry
 from trajectory_guard.kernels.margin import chain_margin
@@ -29,9 +28,8 @@ def link_motion(chain, links, path, body, segment, m, h, builder):
     :param segment: index of the segment.
     :param m: centre of the piece, h its half length, in [0, 1].
     :param builder: ``enclosure.RATIONAL`` or ``ECONOMISED``.
-    :returns: control matrices (K, 12), scaled weights (K,) (economised: ones, the binomials
-        are the caller's), error of the motion without tracking, tracking
-        inflation, largest displacement from the centre pose [m], and whether the motion is usable.
+    :returns: control matrices (K, 12), scaled weights (K,), error of the motion without tracking,
+        what tracking adds, largest displacement from the centre [m], and whether it is usable.
     """
     nodes = len(chain.parent)
     e = enclosure(nodes, nodes, builder)
@@ -51,7 +49,7 @@ def link_motion(chain, links, path, body, segment, m, h, builder):
     matrices = np.empty((count, POSE))
     weights = np.empty(count)
     for i in range(count):
-        weights[i] = e.controls[node, i, POSE] if builder == RATIONAL else 1.0
+        weights[i] = e.weights[node, i]
         for k in range(POSE):
             matrices[i, k] = e.points[node, i, k]
     return matrices, weights, error, slack, sweep, e.sound[node]

@@ -1,0 +1,1 @@
+"""The part of the demo that talks to the guard."""
