@@ -1,0 +1,128 @@
+"""What the parameters of the guard say, checked as a whole."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import math
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.result import NANOSECONDS
+from trajectory_guard.settings import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """
+    One consistent set of the guard's parameters.
+
+    :param robot_description_file: URDF of the robot; '': it comes from the topic.
+    :param robot_description_topic: latched std_msgs/String with the URDF.
+    :param scene_files: URDF and mesh files of the scene; empty: there is no scene yet.
+    :param scene_pose: x, y, z, roll, pitch, yaw of the files' frame in the robot's root link
+        [m, rad], as URDF writes an origin.
+    :param settings: what holds for a request that asks for nothing else; its clearance and its
+        tracking tolerance are the least that a request may ask for.
+    :param tracking_tolerance_joints: the joints that the values of the tracking tolerance belong
+        to; empty: there is one value, for all joints.
+    :param max_points: points that a trajectory may have.
+    :param max_joints: joints that a trajectory or a start state may have.
+    :raises RequestError: naming the parameter and its value.
+    """
+
+    robot_description_file: str
+    robot_description_topic: str
+    scene_files: tuple[str, ...]
+    scene_pose: tuple[float, ...]
+    settings: Settings
+    tracking_tolerance_joints: tuple[str, ...]
+    max_points: int
+    max_joints: int
+
+    def __post_init__(self) -> None:
+        """Refuse what does not fit together; settings and ranges have been checked before."""
+        if len(self.scene_pose) != 6 or not all(map(math.isfinite, self.scene_pose)):
+            raise RequestError(
+                Reason.INVALID_PARAMETER,
+                'scene_pose must be six finite numbers x, y, z, roll, pitch, yaw, '
+                f'got {list(self.scene_pose)}',
+            )
+        joints, values = self.tracking_tolerance_joints, self.settings.tracking_tolerance
+        if len(set(joints)) != len(joints):
+            raise RequestError(
+                Reason.DUPLICATE_JOINT,
+                f'tracking_tolerance_joints names a joint twice: {list(joints)}',
+            )
+        if len(values) != (len(joints) or 1):
+            raise RequestError(
+                Reason.INVALID_TRACKING_TOLERANCE,
+                'tracking_tolerance must be one value, or one for each of '
+                f'tracking_tolerance_joints, got {list(values)} for {list(joints)}',
+            )
+
+    @classmethod
+    def from_values(cls, values: Mapping[str, Any]) -> 'Configuration':
+        """
+        Build a configuration from the values of all parameters.
+
+        :param values: parameter values by name, each within its declared range; None is an empty
+            list, as YAML gives it.
+        :raises RequestError: as the class does, and what the settings refuse.
+        """
+        return cls(
+            robot_description_file=values['robot_description_file'],
+            robot_description_topic=values['robot_description_topic'],
+            scene_files=_named(values['scene_files']),
+            scene_pose=tuple(values['scene_pose'] or ()),
+            settings=Settings(
+                tolerance=values['tolerance'],
+                clearance=values['clearance'],
+                tracking_tolerance=tuple(values['tracking_tolerance'] or ()),
+                deadline_ns=round(values['deadline'] * NANOSECONDS),
+                max_pieces=values['max_pieces'],
+                allowed_start_tolerance=values['allowed_start_tolerance'],
+                joint_limit_tolerance=values['joint_limit_tolerance'],
+                check_joint_limits=values['check_joint_limits'],
+                allow_nonzero_end_velocity=values['allow_nonzero_end_velocity'],
+            ),
+            tracking_tolerance_joints=_named(values['tracking_tolerance_joints']),
+            max_points=values['max_points'],
+            max_joints=values['max_joints'],
+        )
+
+    @property
+    def T_root_scene(self) -> np.ndarray:
+        """Pose of the scene files' frame in the robot's root link, (4, 4) [m]."""
+        T = np.eye(4)
+        T[:3, 3] = self.scene_pose[:3]
+        # Lower case: about the fixed axes, as in URDF.
+        T[:3, :3] = Rotation.from_euler('xyz', self.scene_pose[3:]).as_matrix()
+        return T
+
+    def least_tracking_tolerance(self, joint_names: Sequence[str]) -> tuple[float, ...]:
+        """
+        Return the tracking tolerance that a trajectory is certified with at least.
+
+        :param joint_names: joints of the trajectory, in its order.
+        :returns: one value per joint [rad or m].
+        :raises RequestError: the parameter has no value for one of them.
+        """
+        values = self.settings.tracking_tolerance
+        if not self.tracking_tolerance_joints:
+            return values * len(joint_names)
+        named = dict(zip(self.tracking_tolerance_joints, values, strict=True))
+        for name in joint_names:
+            if name not in named:
+                raise RequestError(
+                    Reason.INVALID_TRACKING_TOLERANCE,
+                    f'tracking_tolerance_joints of the guard has no joint {name!r}, '
+                    f'but {", ".join(named)}',
+                )
+        return tuple(named[name] for name in joint_names)
+
+
+def _named(values: Sequence[str] | None) -> tuple[str, ...]:
+    """Return the names in a list; ROS cannot write an empty list of strings but as ['']."""
+    return tuple(value for value in values or () if value)

@@ -1,0 +1,147 @@
+"""The parameters of the guard: name, default, range, unit, and whether they can change."""
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.settings import LARGEST_LENGTH, Settings, SMALLEST_TOLERANCE
+
+_DEFAULTS = Settings()
+
+
+class Declaration(NamedTuple):
+    """
+    How one parameter is declared.
+
+    :param default: value if nothing else is said; its type is the parameter's.
+    :param description: what it means, with its unit.
+    :param bounds: least and greatest value of a number; None: the configuration checks it.
+    :param read_only: it says what is loaded at the start.
+    """
+
+    default: Any
+    description: str
+    bounds: tuple[float, float] | tuple[int, int] | None = None
+    read_only: bool = False
+
+
+DECLARATIONS = {
+    'robot_description_file': Declaration(
+        '', 'URDF file of the robot; empty: from robot_description_topic', read_only=True
+    ),
+    'robot_description_topic': Declaration(
+        'robot_description',
+        'latched std_msgs/String with the URDF, read if robot_description_file is empty',
+        read_only=True,
+    ),
+    'scene_files': Declaration(
+        [''], 'URDF and mesh files of the scene; empty: the guard is not ready', read_only=True
+    ),
+    'scene_pose': Declaration(
+        [0.0] * 6,
+        'x, y, z [m], roll, pitch, yaw [rad] of the scene files in the root link of the robot',
+        read_only=True,
+    ),
+    'tolerance': Declaration(
+        _DEFAULTS.tolerance,
+        'gaps larger than this are decided, smaller ones may be suspect [m]',
+        (SMALLEST_TOLERANCE, LARGEST_LENGTH),
+    ),
+    'clearance': Declaration(
+        _DEFAULTS.clearance,
+        'distance that free must exceed, the least that a request can ask for [m]',
+        (0.0, LARGEST_LENGTH),
+    ),
+    'tracking_tolerance': Declaration(
+        list(_DEFAULTS.tracking_tolerance),
+        'how far the robot may follow off the path, the least that a request can ask for '
+        '[rad or m]: one value >= 0, or one for each of tracking_tolerance_joints',
+    ),
+    'tracking_tolerance_joints': Declaration(
+        [''], 'joints that the values of tracking_tolerance belong to; empty: one value for all'
+    ),
+    'deadline': Declaration(
+        10.0,
+        'wall-clock time for an answer, what is not decided by then is suspect [s]',
+        (1e-3, 3600.0),
+    ),
+    'max_pieces': Declaration(
+        _DEFAULTS.max_pieces,
+        'pieces of motion examined for an answer, what is left then is suspect',
+        (1, 100_000_000),
+    ),
+    'allowed_start_tolerance': Declaration(
+        _DEFAULTS.allowed_start_tolerance,
+        'how far the start state may be off a first point at time 0 [rad or m]',
+        (0.0, 1.0),
+    ),
+    'joint_limit_tolerance': Declaration(
+        _DEFAULTS.joint_limit_tolerance,
+        'how far the path may leave the joint limits [rad or m]',
+        (0.0, 1.0),
+    ),
+    'check_joint_limits': Declaration(
+        _DEFAULTS.check_joint_limits, 'false leaves joint limits unchecked, and the answer says so'
+    ),
+    'allow_nonzero_end_velocity': Declaration(
+        _DEFAULTS.allow_nonzero_end_velocity, 'accept a last point that does not come to rest'
+    ),
+    'max_points': Declaration(10_000, 'points that a trajectory may have', (1, 1_000_000)),
+    'max_joints': Declaration(
+        256, 'joints that a trajectory or a start state may have', (1, 10_000)
+    ),
+}
+
+
+def declare(node: Node) -> dict[str, Any]:
+    """
+    Declare all parameters.
+
+    :param node: a node that has none of them yet.
+    :returns: the values by name.
+    :raises RequestError: a value of the wrong type or out of its range, or an unknown name.
+    """
+    try:
+        found = [
+            node.declare_parameter(name, declaration.default, _descriptor(declaration))
+            for name, declaration in DECLARATIONS.items()
+        ]
+    except ParameterException as error:
+        raise RequestError(Reason.INVALID_PARAMETER, str(error)) from error
+    # ROS takes no notice of a name that no node declares: a clearance that is misspelt would be no
+    # clearance. (There is no public way to ask for them.)
+    unknown = [name for name in node._parameter_overrides if not node.has_parameter(name)]
+    if unknown:
+        raise RequestError(
+            Reason.INVALID_PARAMETER,
+            f'the guard has no parameter {", ".join(map(repr, sorted(unknown)))}, '
+            f'but {", ".join(DECLARATIONS)}',
+        )
+    return values(found)
+
+
+def values(parameters: Iterable[Parameter]) -> dict[str, Any]:
+    """Return the values of parameters of the guard by name; those of the node are left out."""
+    return {
+        parameter.name: parameter.value
+        for parameter in parameters
+        if parameter.name in DECLARATIONS
+    }
+
+
+def _descriptor(declaration: Declaration) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor(
+        description=declaration.description, read_only=declaration.read_only
+    )
+    if declaration.bounds is not None:
+        low, high = declaration.bounds
+        if isinstance(declaration.default, int):
+            descriptor.integer_range = [IntegerRange(from_value=low, to_value=high)]
+        else:
+            descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
+    return descriptor

@@ -1,0 +1,126 @@
+"""A request of the service as a question to the core."""
+
+from collections.abc import Sequence
+import dataclasses
+from typing import Any, NamedTuple
+
+from msg_adapters.trajectory import (
+    joint_state_from_message,
+    nanoseconds_from_message,
+    trajectory_from_message,
+)
+from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.result import NANOSECONDS
+from trajectory_guard.ros.configuration import Configuration
+from trajectory_guard.settings import Settings
+from trajectory_guard.trajectory import JointState, Trajectory
+
+# The seconds of a Duration are an int32, and the answer gives the times back as Durations.
+LAST_INSTANT_NS = 2**31 * NANOSECONDS - 1
+
+
+class Question(NamedTuple):
+    """
+    What the core is asked.
+
+    :param trajectory: the motion.
+    :param start: where the robot is at time 0; None: unknown.
+    :param settings: what is asked of it.
+    """
+
+    trajectory: Trajectory
+    start: JointState | None
+    settings: Settings
+
+
+def question_from_request(request: Any, configuration: Configuration) -> Question:
+    """
+    Return what a request asks, with the guard's parameters where it does not say.
+
+    :param request: CertifyTrajectory request.
+    :param configuration: the parameters.
+    :raises TrajectoryGuardError: it is malformed or too large, or asks for less than it may.
+    """
+    _check_sizes(request, configuration)
+    message = request.trajectory
+    if nanoseconds_from_message(message.header.stamp) != 0:
+        # A stamp moves the points, but not the moment at which the controller begins: the way to
+        # the first point would take longer, or the motion begin in the middle.
+        raise RequestError(
+            Reason.INVALID_PARAMETER,
+            'header.stamp of the trajectory must be 0 (start when it arrives), '
+            f'got {message.header.stamp.sec} s {message.header.stamp.nanosec} ns',
+        )
+    trajectory = trajectory_from_message(message)
+    if trajectory.times_ns[-1] > LAST_INSTANT_NS:
+        raise RequestError(
+            Reason.TOO_LARGE,
+            f'the last point is at {trajectory.times_ns[-1]} ns, later than a Duration can say',
+        )
+    state = request.start_state
+    given = len(state.name) or len(state.position) or len(state.velocity)
+    return Question(
+        trajectory=trajectory,
+        start=joint_state_from_message(state) if given else None,
+        settings=_settings(request, trajectory.joint_names, configuration),
+    )
+
+
+def _check_sizes(request: Any, configuration: Configuration) -> None:
+    """Refuse what is too large before anything is done with it."""
+    for field, values, limit in (
+        ('points', request.trajectory.points, 'max_points'),
+        ('joint_names', request.trajectory.joint_names, 'max_joints'),
+        ('names in start_state', request.start_state.name, 'max_joints'),
+        ('values in tracking_tolerance', request.tracking_tolerance, 'max_joints'),
+    ):
+        most = getattr(configuration, limit)
+        if len(values) > most:
+            raise RequestError(
+                Reason.TOO_LARGE, f'the request has {len(values)} {field}, {limit} is {most}'
+            )
+
+
+def _settings(request: Any, joint_names: Sequence[str], configuration: Configuration) -> Settings:
+    """Return the settings of a request; a zero in it stands for the guard's own value."""
+    least = dataclasses.replace(
+        configuration.settings,
+        tracking_tolerance=configuration.least_tracking_tolerance(joint_names),
+    )
+    asked = dataclasses.replace(
+        least,
+        tolerance=request.tolerance or least.tolerance,
+        clearance=request.clearance or least.clearance,
+        tracking_tolerance=_tracking_tolerance(
+            request.tracking_tolerance, least.tracking_tolerance
+        ),
+        deadline_ns=nanoseconds_from_message(request.deadline) or least.deadline_ns,
+    )
+    # Settings have refused what is negative or NaN by now.
+    if asked.clearance < least.clearance:
+        raise RequestError(
+            Reason.BELOW_MINIMUM,
+            f'clearance {asked.clearance:g} m is less than the {least.clearance:g} m of the guard',
+        )
+    for name, value, minimum in zip(
+        joint_names, asked.tracking_tolerance, least.tracking_tolerance, strict=True
+    ):
+        if value < minimum:
+            raise RequestError(
+                Reason.BELOW_MINIMUM,
+                f'tracking_tolerance {value:g} of joint {name!r} is less than the {minimum:g} '
+                'of the guard',
+            )
+    return asked
+
+
+def _tracking_tolerance(asked: Sequence[float], least: Sequence[float]) -> tuple[float, ...]:
+    """Return one value per joint: the one asked for, or the guard's where that is zero."""
+    if len(asked) <= 1:
+        asked = [*asked, 0.0][:1] * len(least)
+    if len(asked) != len(least):
+        raise RequestError(
+            Reason.INVALID_TRACKING_TOLERANCE,
+            f'tracking_tolerance has {len(asked)} values for {len(least)} joints',
+        )
+    return tuple(value or minimum for value, minimum in zip(asked, least, strict=True))
