@@ -4,6 +4,7 @@ import math
 from typing import Any, NamedTuple
 
 from msg_adapters.trajectory import NANOSECONDS, nanoseconds_from_message
+from trajectory_guard.errors import Reason, TrajectoryError
 from trajectory_guard.result import Interval, Result, Status, Verdict
 
 # A Duration has no NaN; no instant of a trajectory is negative.
@@ -94,8 +95,11 @@ def nanoseconds_to_message(time_ns: int, duration_type: type) -> Any:
 
     :param time_ns: time [ns].
     :param duration_type: the message class.
+    :raises TrajectoryError: the seconds do not fit the message; writing it would wrap them.
     """
     sec, nanosec = divmod(int(time_ns), NANOSECONDS)
+    if not -(2**31) <= sec < 2**31:
+        raise TrajectoryError(Reason.TOO_LARGE, f'{sec} s do not fit a Duration message')
     return duration_type(sec=sec, nanosec=nanosec)
 
 

@@ -485,7 +485,7 @@ def test_a_path_of_the_wrong_shape_is_refused(change):
     """Kernels take shapes on trust, so a path never has another."""
     path = joint_path(slider().robot.movable, slide(0.0, 1.0))
     with pytest.raises(RequestError):
-        dataclasses.replace(path, **change)
+        certify(slider(), dataclasses.replace(path, **change))
 
 
 def test_a_standing_body_within_rounding_is_one_piece():

@@ -40,7 +40,7 @@ class JointPath:
         for the value at every s as well [rad or m].
     :param unknown_until_ns: before this time no start state tells where the arm is [ns].
     :param limits_checked: whether the joint limits were enforced.
-    :raises RequestError: an array has another shape, a value is not finite, knots fall.
+    :raises RequestError: an array has another shape, or knots fall.
     """
 
     joint_names: tuple[str, ...]
@@ -52,7 +52,7 @@ class JointPath:
     limits_checked: bool
 
     def __post_init__(self) -> None:
-        """Check shapes and values, which kernels take on trust, and make the arrays read-only."""
+        """Check the shapes, which kernels take on trust, and make the arrays read-only."""
         segments, n = len(self.knots_ns) - 1, len(self.joint_names)
         for name, shape, dtype in (
             ('in_path', (n,), np.bool_),
@@ -70,10 +70,6 @@ class JointPath:
             object.__setattr__(self, name, array)
         if not (np.diff(self.knots_ns) >= 0).all() or self.knots_ns[0] < 0:
             raise RequestError(Reason.UNSORTED_TIMES, f'knots_ns must rise, got {self.knots_ns}')
-        if not (np.isfinite(self.coefficients).all() and (self.coefficient_error >= 0.0).all()):
-            raise RequestError(
-                Reason.NOT_FINITE, 'coefficients must be finite and coefficient_error >= 0'
-            )
 
     @property
     def duration_ns(self) -> int:

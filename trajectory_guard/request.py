@@ -85,6 +85,10 @@ def motion_path(workcell: Workcell, path: JointPath, slack: np.ndarray) -> Path:
     :raises RequestError: the path leaves the range of the kernels.
     """
     _check_slack(slack, len(path.joint_names))
+    if not (path.coefficient_error >= 0.0).all():
+        raise RequestError(
+            Reason.INVALID_PARAMETER, 'coefficient_error must be >= 0 and not NaN everywhere'
+        )
     size = np.abs(path.coefficients).sum(axis=2).max(axis=0) + path.coefficient_error.max(axis=0)
     if not (size <= LARGEST).all():
         worst = int(np.argmax(~(size <= LARGEST)))

@@ -9,6 +9,7 @@ import numpy as np
 from trajectory_guard.body import LARGEST_COORDINATE
 from trajectory_guard.errors import Reason, RobotError
 from trajectory_guard.mesh import MeshFile
+from trajectory_guard.pose import pose_matrix
 from trajectory_guard.primitive import Box, Cylinder, Sphere
 from trajectory_guard.robot import Collision, Joint, JointType, Mimic, Shape
 
@@ -97,10 +98,9 @@ def _numbers(
 
 def _origin(element: Element) -> np.ndarray:
     """Return the pose of an `<origin>`: R = Rz(yaw) Ry(pitch) Rx(roll), the identity if absent."""
-    T = np.eye(4)
     origin = only(element, 'origin')
     if origin is None:
-        return T
+        return np.eye(4)
     unknown = set(origin.keys()) - {'xyz', 'rpy'}
     if unknown:
         raise RobotError(
@@ -110,14 +110,7 @@ def _origin(element: Element) -> np.ndarray:
     rpy = _numbers(origin, 'rpy', 3, (0.0, 0.0, 0.0))
     if not max(map(abs, xyz)) <= LARGEST_COORDINATE or not max(map(abs, rpy)) < math.inf:
         raise RobotError(Reason.ROBOT_INVALID, f'<origin> is out of range: {xyz} {rpy}')
-    (cr, cp, cy), (sr, sp, sy) = (tuple(map(f, rpy)) for f in (math.cos, math.sin))
-    T[:3, :3] = (
-        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
-        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
-        (-sp, cp * sr, cp * cr),
-    )
-    T[:3, 3] = xyz
-    return T
+    return pose_matrix(xyz, rpy)
 
 
 def _axis(element: Element) -> np.ndarray:

@@ -7,10 +7,15 @@ import numpy as np
 
 from trajectory_guard.body import ConvexBody
 from trajectory_guard.certify import judge
+from trajectory_guard.errors import Reason, TrajectoryGuardError
+from trajectory_guard.kernels.jit import FOLDER
+from trajectory_guard.result import Verdict
 from trajectory_guard.scene import Obstacle, Scene
 from trajectory_guard.trajectory import Point, Trajectory
 from trajectory_guard.urdf import robot_from_urdf
 from trajectory_guard.workcell import Workcell
+
+COMPILING = 'compiling the kernels (once; about half a minute)'
 
 # Every kind of joint and solid shares the same kernels, so one of each is enough.
 _ROBOT = """
@@ -22,16 +27,32 @@ _ROBOT = """
 """
 
 
+def is_cold() -> bool:
+    """Say whether the kernels have yet to be compiled on this machine."""
+    return FOLDER is None or next(FOLDER.rglob('*.nbi'), None) is None
+
+
 def warm_up() -> None:
-    """Certify a tiny motion, by the same path as every other."""
+    """
+    Certify a tiny motion, by the same path as every other.
+
+    :raises TrajectoryGuardError: the answer is not the known one, so none can be trusted.
+    """
     ball = ConvexBody(vertices=np.array([[0.0, 0.0, 2.0]]), ball=0.5)
     workcell = Workcell(robot_from_urdf(_ROBOT), Scene((Obstacle('ball', (ball,)),), digest=''))
-    judge(workcell, Trajectory.from_points(['elbow'], [Point(0, [0.0]), Point(1, [1.0])]))
+    turn = Trajectory.from_points(['elbow'], [Point(0, [0.0]), Point(1, [1.0])])
+    result = judge(workcell, turn)
+    if result.verdict != Verdict.FREE:
+        raise TrajectoryGuardError(
+            Reason.INTERNAL_ERROR,
+            f'a free motion was answered {result.verdict.name}: {result.message}',
+        )
 
 
 def main() -> None:
     """Warm up and say how long it took."""
-    print('compiling the kernels (once; about half a minute) ...', file=sys.stderr, flush=True)
+    if is_cold():
+        print(f'{COMPILING} ...', file=sys.stderr, flush=True)
     begin = time.perf_counter()
     warm_up()
     print(f'kernels ready after {time.perf_counter() - begin:.1f} s', file=sys.stderr)

@@ -12,6 +12,9 @@ from trajectory_guard.robot import Robot
 from trajectory_guard.scene import Scene
 from trajectory_guard.tree import Tree, tree
 
+# Sets of commanded joints whose pairs are kept; clients choose them, so their number is bounded.
+MOST_KEPT = 64
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pairs:
@@ -103,9 +106,12 @@ class Workcell:
         :raises RobotError: the joints move no link with collision geometry.
         """
         key = in_path.tobytes()
-        if key not in self._pairs:
-            self._pairs[key] = self._pair_up(in_path)
-        return self._pairs[key]
+        pairs = self._pairs.get(key)
+        if pairs is None:
+            pairs = self._pair_up(in_path)
+            if len(self._pairs) < MOST_KEPT:
+                self._pairs[key] = pairs
+        return pairs
 
     def _pair_up(self, in_path: np.ndarray) -> Pairs:
         moved = np.zeros(len(in_path), bool)

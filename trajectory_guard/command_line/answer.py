@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 import dataclasses
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from trajectory_guard.certify import judge
 from trajectory_guard.command_line.options import Pose
@@ -12,10 +11,12 @@ from trajectory_guard.command_line.request import Request, SELF_COLLISION_WARNIN
 from trajectory_guard.command_line.sources import Selection, Source, sources
 from trajectory_guard.command_line.start import completed, depends_on_duration, without
 from trajectory_guard.errors import Reason, TrajectoryError
+from trajectory_guard.pose import pose_matrix
 from trajectory_guard.result import Result
 from trajectory_guard.robot import Robot
 from trajectory_guard.scene import load_scene
 from trajectory_guard.urdf import load_robot
+from trajectory_guard.warm import warm_up
 from trajectory_guard.workcell import Workcell
 
 UNMEASURED = (
@@ -39,6 +40,8 @@ def answers(request: Request) -> Iterator[Result]:
     robot = load_robot(request.urdf)
     _check_names(robot, request.start)
     workcell = Workcell(robot, load_scene(request.scenes, _matrix(request.scene_pose)))
+    # Else the first answer's time would be that of loading or compiling the kernels.
+    warm_up()
     selection = Selection(request.topics, request.joint_state_topics)
     for path in request.paths:
         for source in sources(path, selection, request.bags_only):
@@ -78,8 +81,4 @@ def _matrix(pose: Pose | None) -> np.ndarray | None:
     """Return a pose as (4, 4) matrix."""
     if pose is None:
         return None
-    T = np.eye(4)
-    T[:3, 3] = pose.xyz
-    # Lower case: about the fixed axes, as in URDF.
-    T[:3, :3] = Rotation.from_euler('xyz', pose.rpy).as_matrix()
-    return T
+    return pose_matrix(pose.xyz, pose.rpy)

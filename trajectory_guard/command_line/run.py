@@ -47,9 +47,12 @@ def _run(request: Request, json: bool) -> ExitCode:
     from trajectory_guard.command_line.answer import answers
     from trajectory_guard.command_line.json_lines import JsonLines
     from trajectory_guard.command_line.report import Report
+    from trajectory_guard.warm import COMPILING, is_cold
 
     if request.self_collision:
         _say(f'note: {SELF_COLLISION_WARNING}')
+    if is_cold():
+        _say(f'note: {COMPILING}')
     output = JsonLines(sys.stdout) if json else Report(sys.stdout)
     code = ExitCode.ALL_FREE
     judged = rejected = 0

@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.pose import pose_matrix
 from trajectory_guard.result import NANOSECONDS
 from trajectory_guard.settings import Settings
 
@@ -95,11 +95,7 @@ class Configuration:
     @property
     def T_root_scene(self) -> np.ndarray:
         """Pose of the scene files' frame in the robot's root link, (4, 4) [m]."""
-        T = np.eye(4)
-        T[:3, 3] = self.scene_pose[:3]
-        # Lower case: about the fixed axes, as in URDF.
-        T[:3, :3] = Rotation.from_euler('xyz', self.scene_pose[3:]).as_matrix()
-        return T
+        return pose_matrix(self.scene_pose[:3], self.scene_pose[3:])
 
     def least_tracking_tolerance(self, joint_names: Sequence[str]) -> tuple[float, ...]:
         """
