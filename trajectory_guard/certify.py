@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 import dataclasses
 import logging
-import threading
 import time
 
 import numpy as np
 
+from trajectory_guard.deadline import stop_flag
 from trajectory_guard.errors import Reason, TrajectoryGuardError
 from trajectory_guard.joint_path import INTERPOLATION, joint_path, JointPath
 from trajectory_guard.kernels.cover import cover
@@ -47,9 +47,7 @@ def certify(
         slack = tracking_slack(workcell.robot.movable, path, (), settings)
     pairs = workcell.pairs(path.in_path)
     motion = motion_path(workcell, path, slack)
-    stop = np.zeros(1, np.int64)
-    watchdog = _watchdog(settings.deadline_ns, stop)
-    try:
+    with stop_flag(settings.deadline_ns) as stop:
         ints, floats, pieces = cover(
             workcell.tree.chain,
             workcell.links,
@@ -62,9 +60,6 @@ def certify(
             stop,
             ECONOMISED,
         )
-    finally:
-        if watchdog is not None:
-            watchdog.cancel()
     rows = intervals(
         path.knots_ns,
         ints,
@@ -128,19 +123,6 @@ def judge(
         internal = TrajectoryGuardError(Reason.INTERNAL_ERROR, f'internal error: {error!r}')
         return Result.rejected(internal, settings, trajectory.name)
     return dataclasses.replace(result, name=trajectory.name)
-
-
-def _watchdog(deadline_ns: int | None, stop: np.ndarray) -> threading.Timer | None:
-    """Set the stop flag when the deadline has passed; at once for a deadline of zero."""
-    if deadline_ns is None:
-        return None
-    if deadline_ns == 0:
-        stop[0] = 1
-        return None
-    timer = threading.Timer(deadline_ns / NANOSECONDS, stop.fill, (1,))
-    timer.daemon = True
-    timer.start()
-    return timer
 
 
 def _verdict(rows: Sequence[Interval]) -> tuple[Verdict, str, str]:
