@@ -6,10 +6,10 @@ int64), writes into arrays of the caller and returns numbers.  Arithmetic is IEE
 ``error_model='numpy'`` and without any fast-math flag, so NaN and infinity propagate, and every
 comparison that certifies is written so that NaN fails it.
 
-*Trusted* (a wrong line here could call a collision free): ``piece`` (polynomials of a piece and
-the half-angle fit), ``chain`` (control matrices of the links), ``reach`` (lever arms),
-``separation`` (the inequality that separates), ``margin`` (rounding), ``cover`` (which pairs and
-pieces are closed). *Untrusted*, may only propose: ``gjk``, ``deepest``.
+*Trusted* (a wrong line here could call a collision free): the motion in ``piece``, ``chain``,
+``economised`` and ``enclosure``; lever arms in ``reach``; the inequalities in ``separation`` and
+``cull``; rounding in ``margin``; the books in ``cover``, ``pair`` and ``leaf``; for collisions
+``witness``.  *Untrusted*, may only propose: ``gjk`` and the search in ``deepest``.
 
 Shared conventions: a pose is 12 numbers, the rows of a 3x4 matrix ``[R | t]``; ``tau`` runs over
 [-1, 1] on a piece; a *node* is a movable joint, its frame moves with the joint and has the joint
