@@ -10,11 +10,11 @@ import numpy as np
 from msg_adapters.bag import Bag, BagMessage
 from msg_adapters.trajectory import (
     joint_state_from_message,
-    NANOSECONDS,
     stamp_from_message,
     trajectory_from_message,
 )
 from trajectory_guard.errors import Reason, TrajectoryError
+from trajectory_guard.result import NANOSECONDS
 from trajectory_guard.trajectory import JointState, Trajectory
 
 JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'

@@ -3,9 +3,9 @@
 import math
 from typing import Any, NamedTuple
 
-from msg_adapters.trajectory import NANOSECONDS, nanoseconds_from_message
+from msg_adapters.trajectory import nanoseconds_from_message
 from trajectory_guard.errors import Reason, TrajectoryError
-from trajectory_guard.result import Interval, Result, Status, Verdict
+from trajectory_guard.result import Interval, NANOSECONDS, Result, Status, Verdict
 
 # A Duration has no NaN; no instant of a trajectory is negative.
 UNKNOWN_INSTANT_NS = -NANOSECONDS

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from trajectory_guard.errors import Reason, TrajectoryError
+from trajectory_guard.result import NANOSECONDS
 from trajectory_guard.trajectory import JointState, Point, Trajectory
-
-NANOSECONDS = 1_000_000_000
 
 
 def nanoseconds_from_message(duration: Any) -> int:

@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 
-NANOSECONDS = 1_000_000_000
+from trajectory_guard.result import NANOSECONDS
 
 
 class _Watch:
