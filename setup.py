@@ -29,6 +29,7 @@ setup(
     maintainer='trajectory_guard maintainers',
     maintainer_email='maintainers@trajectory-guard.invalid',
     packages=find_packages(include=[NAME, f'{NAME}.*', 'msg_adapters', 'msg_adapters.*']),
+    package_data={f'{NAME}.kernels': ['*.hpp', '*.cpp']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),

@@ -11,12 +11,12 @@ from trajectory_guard.deadline import stop_flag
 from trajectory_guard.errors import Reason, TrajectoryGuardError
 from trajectory_guard.joint_path import INTERPOLATION, joint_path, JointPath
 from trajectory_guard.kernels.cover import cover
-from trajectory_guard.kernels.enclosure import ECONOMISED, Path
-from trajectory_guard.kernels.still import overlaps
+from trajectory_guard.kernels.layout import Path
+from trajectory_guard.kernels.touching import touching
 from trajectory_guard.request import check_joints, motion_path, tracking_slack
 from trajectory_guard.result import Interval, NANOSECONDS, Result, Status, Verdict
 from trajectory_guard.settings import Settings
-from trajectory_guard.timeline import intervals
+from trajectory_guard.timeline import intervals, with_witnesses
 from trajectory_guard.trajectory import JointState, Trajectory
 from trajectory_guard.workcell import Pairs, Workcell
 
@@ -48,22 +48,21 @@ def certify(
     pairs = workcell.pairs(path.in_path)
     motion = motion_path(workcell, path, slack)
     with stop_flag(settings.deadline_ns) as stop:
-        ints, floats, pieces = cover(
-            workcell.tree.chain,
-            workcell.links,
-            workcell.obstacles,
+        covered = cover(
+            workcell.packed,
             motion,
-            pairs.checked,
+            pairs.moving,
             settings.tolerance,
             settings.clearance,
             settings.max_pieces,
+            settings.scope,
+            settings.want_certificate,
             stop,
-            ECONOMISED,
         )
+    leaves = with_witnesses(covered.leaves)
     rows = intervals(
         path.knots_ns,
-        ints,
-        floats,
+        leaves,
         workcell.link_names,
         workcell.obstacle_names,
         path.unknown_until_ns,
@@ -80,7 +79,7 @@ def certify(
         robot_hash=workcell.robot_hash,
         scene_hash=workcell.scene_hash,
         compute_time=time.perf_counter() - begin,
-        pieces=int(pieces),
+        pieces=covered.pieces,
         pairs_checked=pairs.count,
         unchecked_pairs=pairs.unchecked,
         warnings=_warnings(workcell, motion, pairs, path),
@@ -149,20 +148,14 @@ def _verdict(rows: Sequence[Interval]) -> tuple[Verdict, str, str]:
 def _warnings(workcell: Workcell, motion: Path, pairs: Pairs, path: JointPath) -> tuple[str, ...]:
     """Return what the verdict does not say: parts that touch without moving, limits unchecked."""
     warnings = []
-    touching = overlaps(
-        workcell.tree.chain,
-        workcell.links,
-        workcell.obstacles,
-        motion,
-        pairs.still,
-    )
+    touch = touching(workcell.packed, motion, pairs.still)
     names = sorted(
         {
             (
                 workcell.link_names[pairs.still[i, 0]],
                 workcell.obstacle_names[pairs.still[i, 1]],
             )
-            for i in np.flatnonzero(touching)
+            for i in np.flatnonzero(touch)
         }
     )
     if names:

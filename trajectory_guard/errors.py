@@ -62,6 +62,10 @@ class Reason(str, Enum):
     DEPTH = 'depth'
     BUDGET = 'budget'
     DEADLINE = 'deadline'
+    NOT_EXAMINED = 'not_examined'
+
+    # A certificate.
+    CERTIFICATE_INVALID = 'certificate_invalid'
 
     # The guard itself.
     BUSY = 'busy'

@@ -8,8 +8,8 @@ import numpy as np
 
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.joint_path import JointPath
-from trajectory_guard.kernels import enclosure
-from trajectory_guard.kernels.single import link_motion
+from trajectory_guard.kernels import layout
+from trajectory_guard.kernels.link_motion import link_motion
 from trajectory_guard.request import check_joints, motion_path
 from trajectory_guard.workcell import Workcell
 
@@ -17,8 +17,8 @@ from trajectory_guard.workcell import Workcell
 class Builder(IntEnum):
     """How a motion is built: exact rational curves, or polynomials economised along the chain."""
 
-    RATIONAL = enclosure.RATIONAL
-    ECONOMISED = enclosure.ECONOMISED
+    RATIONAL = layout.RATIONAL
+    ECONOMISED = layout.ECONOMISED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,15 +90,13 @@ def rational_motion(
     if not (0 <= body < len(workcell.link_names) and workcell.link_nodes[body] >= 0):
         raise RequestError(Reason.INVALID_PARAMETER, f'body {body} hangs on no movable joint')
     check_joints(workcell.robot.movable, path)
-    half = 0.5 ** (level + 1)
     matrices, weights, error, inflation, sweep, sound = link_motion(
-        workcell.tree.chain,
-        workcell.links,
+        workcell.packed,
         motion_path(workcell, path, np.zeros(len(path.joint_names)) if slack is None else slack),
         body,
         segment,
-        (2 * numerator + 1) * half,
-        half,
+        numerator,
+        level,
         int(builder),
     )
     if not (sound and math.isfinite(error)):

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trajectory_guard.body import ConvexBody
-from trajectory_guard.kernels.margin import UP
-from trajectory_guard.kernels.solids import Solids
+from trajectory_guard.body import ConvexBody, U
+from trajectory_guard.kernels.layout import BALL, BOX, Boxes, FAR, HALF, LANES, Solids, UP
 
 # A box frame is looked for among this many of a polytope's faces.
 FACES_TRIED = 12
@@ -19,13 +18,15 @@ def solids(bodies: Sequence[ConvexBody], nodes: Sequence[int]) -> Solids:
     :param bodies: convex bodies, each in the frame of its node (obstacles: the root frame).
     :param nodes: node of each body, -1 for the root.
     """
-    ends = np.cumsum([len(body.vertices) for body in bodies])
-    face_ends = np.cumsum([len(body.faces) for body in bodies])
+    vertices = [_whole(body.vertices) for body in bodies]
+    faces = [_whole(body.faces) for body in bodies]
+    ends = np.cumsum([len(rows) for rows in vertices])
+    face_ends = np.cumsum([len(rows) for rows in faces])
     ranges = np.column_stack(
         [
-            ends - [len(body.vertices) for body in bodies],
+            ends - [len(rows) for rows in vertices],
             ends,
-            face_ends - [len(body.faces) for body in bodies],
+            face_ends - [len(rows) for rows in faces],
             face_ends,
             nodes,
         ]
@@ -44,8 +45,70 @@ def solids(bodies: Sequence[ConvexBody], nodes: Sequence[int]) -> Solids:
         ranges=ranges.astype(np.int64),
         size=np.array(size),
         place=np.array(place),
-        vertices=np.ascontiguousarray(np.concatenate([body.vertices for body in bodies]).T),
-        faces=np.concatenate([body.faces for body in bodies]),
+        vertices=np.ascontiguousarray(np.concatenate(vertices).T),
+        faces=np.ascontiguousarray(np.concatenate(faces).T),
+    )
+
+
+def _whole(rows: np.ndarray) -> np.ndarray:
+    """Return rows filled up to whole vectors with copies of the last one, which change nothing."""
+    missing = -len(rows) % LANES
+    return np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)]) if missing else rows
+
+
+def boxes(obstacles: Solids) -> Boxes:
+    """
+    Arrange the boxes of obstacles in blocks of neighbours, and a tree over the blocks.
+
+    The tree halves the obstacles about the longest side of their centres' bounds.
+
+    :param obstacles: packed obstacles.
+    """
+    half = obstacles.place[:, HALF : HALF + 3]
+    pose = obstacles.place[:, BOX:].reshape(-1, 3, 4)
+    middle = pose[:, :, 3]
+    # Each of the sums below errs by a few U of its size; the doubled 16 U cover them all.
+    reach = np.einsum('nrc,nc->nr', np.abs(pose[:, :, :3]), half) + obstacles.size[:, BALL, None]
+    reach += 32.0 * U * (np.abs(middle) + reach)
+    low, high = middle - reach, middle + reach
+    blocks: list[np.ndarray] = []
+    bounds: list[np.ndarray] = []
+    branch: list[tuple[int, int]] = []
+
+    def grow(some: np.ndarray) -> int:
+        number = len(bounds)
+        bounds.append(np.concatenate([low[some].min(axis=0), high[some].max(axis=0)]))
+        branch.append((-1, len(blocks)))
+        if len(some) <= LANES:
+            blocks.append(some)
+            return number
+        axis = int(np.ptp(middle[some], axis=0).argmax())
+        some = some[np.argsort(middle[some, axis], kind='stable')]
+        # Whole blocks on one side, so that few lanes stay empty.
+        cut = LANES * ((len(some) // LANES + 1) // 2) if len(some) > 2 * LANES else LANES
+        branch[number] = (grow(some[:cut]), grow(some[cut:]))
+        return number
+
+    grow(np.arange(len(middle)))
+    lanes = np.full((len(blocks), LANES), -1, np.int64)
+    for k, some in enumerate(blocks):
+        lanes[k, : len(some)] = some
+    # Empty lanes repeat the first obstacle: their numbers must be finite.
+    filled = np.where(lanes >= 0, lanes, lanes[:, :1])
+    columns = np.concatenate(
+        [
+            pose[:, :, :3].transpose(0, 2, 1).reshape(-1, 9),
+            middle,
+            half,
+            obstacles.size[:, [BALL, FAR]],
+        ],
+        axis=1,
+    )
+    return Boxes(
+        box=np.ascontiguousarray(columns[filled].transpose(0, 2, 1)),
+        obstacle=lanes,
+        bounds=np.array(bounds),
+        branch=np.array(branch, np.int64),
     )
 
 

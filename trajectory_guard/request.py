@@ -6,9 +6,7 @@ import numpy as np
 
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.joint_path import JointPath
-from trajectory_guard.kernels.chain import PRISMATIC
-from trajectory_guard.kernels.enclosure import Path
-from trajectory_guard.kernels.reach import lever_arms
+from trajectory_guard.kernels.layout import Path, PRISMATIC, UP
 from trajectory_guard.robot import Joint
 from trajectory_guard.settings import Settings
 from trajectory_guard.workcell import Workcell
@@ -77,7 +75,7 @@ def tracking_slack(
 
 def motion_path(workcell: Workcell, path: JointPath, slack: np.ndarray) -> Path:
     """
-    Return a path as kernel arrays, with the lever arms its prismatic joints allow.
+    Return a path as kernel arrays, with how far its prismatic joints slide.
 
     :param workcell: robot and scene.
     :param path: the motion of every movable joint of that robot.
@@ -96,28 +94,12 @@ def motion_path(workcell: Workcell, path: JointPath, slack: np.ndarray) -> Path:
             Reason.TOO_LARGE,
             f'joint {path.joint_names[worst]!r} moves by {size[worst]:g}, more than {LARGEST:g}',
         )
-    chain = workcell.tree.chain
-    bodies = len(workcell.link_names)
-    rho = np.empty((bodies, len(slack)))
-    reach = np.empty(bodies)
-    travel = np.where(chain.kind == PRISMATIC, size + slack, 0.0)
-    lever_arms(
-        chain,
-        workcell.link_nodes,
-        workcell.extent,
-        workcell.perpendicular,
-        workcell.offsets,
-        travel,
-        rho,
-        reach,
-    )
+    sliding = workcell.tree.chain.kind == PRISMATIC
     return Path(
         coefficients=path.coefficients,
         rounding=path.coefficient_error,
-        moving=(path.coefficients[:, :, 1:] != 0.0).any(axis=(0, 2)),
         slack=slack,
-        rho=rho,
-        reach=reach,
+        travel=np.where(sliding, (size + slack) * UP, 0.0),
     )
 
 

@@ -1,6 +1,6 @@
 """The answer: intervals that partition [0, T], and one verdict."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 from trajectory_guard.errors import TrajectoryGuardError
@@ -100,6 +100,7 @@ class Result:
     :param warnings: what a user should know and no interval can say.
     :param duration_ns: time of the last point [ns].
     :param name: the trajectory's label.
+    :param certificate: what proves the intervals, as a JSON object; None: not asked for.
     """
 
     verdict: Verdict
@@ -118,6 +119,7 @@ class Result:
     warnings: tuple[str, ...] = ()
     duration_ns: int = 0
     name: str = ''
+    certificate: dict | None = field(default=None, repr=False, compare=False)
 
     @classmethod
     def rejected(

@@ -1,6 +1,7 @@
 """What a request asks for, checked once."""
 
 from dataclasses import dataclass
+from enum import IntEnum
 import math
 
 from trajectory_guard.errors import Reason, RequestError
@@ -8,6 +9,19 @@ from trajectory_guard.errors import Reason, RequestError
 # A proof at a tolerance below a nanometre would be a statement about rounding, not about robots.
 SMALLEST_TOLERANCE = 1e-9
 LARGEST_LENGTH = 1e6
+
+
+class Scope(IntEnum):
+    """
+    How much of the motion is asked about; what is not looked at is *suspect*, never free.
+
+    ALL: every interval. FIRST: up to the first interval that is not free, in time order. VERDICT:
+    until something is known not to be free, wherever that is found first.
+    """
+
+    ALL = 0
+    FIRST = 1
+    VERDICT = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +35,8 @@ class Settings:
         joint of the trajectory, or one per joint in the trajectory's order [rad or m].
     :param deadline_ns: wall-clock time for the answer; the rest is *suspect* [ns]; None: no limit.
     :param max_pieces: motion pieces that may be examined; the rest is *suspect*.
+    :param scope: how much of the motion is asked about.
+    :param want_certificate: write down what proves each answer.
     :param allowed_start_tolerance: start state against a point 0 at time 0 [rad or m].
     :param joint_limit_tolerance: how far the curve may leave the joint limits [rad or m].
     :param check_joint_limits: False leaves limits unchecked, and the result says so.
@@ -33,6 +49,8 @@ class Settings:
     tracking_tolerance: tuple[float, ...] = (0.0,)
     deadline_ns: int | None = None
     max_pieces: int = 200_000
+    scope: Scope = Scope.ALL
+    want_certificate: bool = False
     allowed_start_tolerance: float = 0.01
     joint_limit_tolerance: float = 1e-6
     check_joint_limits: bool = True

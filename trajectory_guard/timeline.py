@@ -1,26 +1,22 @@
 """Leaves of the cover to intervals in nanoseconds that partition [0, T]."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 import math
 
 import numpy as np
 
 from trajectory_guard.errors import Reason
-from trajectory_guard.kernels import leaf as leaves
+from trajectory_guard.kernels import layout
 from trajectory_guard.result import Interval, Status
 
-_STATUS = {
-    leaves.FREE: Status.FREE,
-    leaves.SUSPECT: Status.SUSPECT,
-    leaves.COLLISION: Status.COLLISION,
-}
 _REASON = {
-    leaves.BY_TOLERANCE: Reason.TOLERANCE,
-    leaves.BY_DEPTH: Reason.DEPTH,
-    leaves.BY_BUDGET: Reason.BUDGET,
-    leaves.BY_STOP: Reason.DEADLINE,
+    layout.BY_TOLERANCE: Reason.TOLERANCE,
+    layout.BY_DEPTH: Reason.DEPTH,
+    layout.BY_BUDGET: Reason.BUDGET,
+    layout.BY_STOP: Reason.DEADLINE,
+    layout.BY_SCOPE: Reason.NOT_EXAMINED,
 }
 
 
@@ -53,8 +49,7 @@ class Instant:
 
 def intervals(
     knots_ns: np.ndarray,
-    ints: np.ndarray,
-    floats: np.ndarray,
+    leaves: np.ndarray,
     link_names: Sequence[str],
     obstacle_names: Sequence[str],
     unknown_until_ns: int = 0,
@@ -63,11 +58,11 @@ def intervals(
     Merge leaves of equal status and round their ends into what is proved.
 
     A free interval may shrink by rounding, never grow; so may a collision where it meets a suspect
-    interval.  The ends of neighbours stay equal.
+    interval.  The ends of neighbours stay equal.  Where the leaves end before the path does, the
+    rest was not examined.
 
     :param knots_ns: (S + 1,) segment ends [ns].
-    :param ints: (L, 9) leaves in time order, see ``kernels.leaf``.
-    :param floats: (L, 7) their gap bounds and places.
+    :param leaves: (L,) LEAF in time order, see ``kernels.layout``.
     :param link_names: name of the link of each packed body.
     :param obstacle_names: name of each packed obstacle.
     :param unknown_until_ns: end of the leading span without a start state [ns].
@@ -77,74 +72,87 @@ def intervals(
         rows.append(
             Interval(0, unknown_until_ns, Status.SUSPECT, Reason.START_STATE_UNKNOWN.value)
         )
-    ints, floats = _with_witnesses(ints, floats)
-    cuts = (
-        np.flatnonzero(
-            (np.diff(ints[:, leaves.STATUS]) != 0) | (np.diff(ints[:, leaves.REASON]) != 0)
-        )
-        + 1
-    )
-    firsts = [0, *cuts.tolist()]
-    lasts = [*cuts.tolist(), len(ints)]
-    start_ns = int(knots_ns[0])
-    for g, (first, last) in enumerate(zip(firsts, lasts, strict=True)):
-        row = _merged(knots_ns, ints[first:last], floats[first:last], link_names, obstacle_names)
-        if g + 1 < len(firsts):
-            end_ns = _boundary(
-                row.status,
-                _STATUS[int(ints[last, leaves.STATUS])],
-                _instant(knots_ns, ints[last], leaves.START),
-            )
+    start_ns, last_ns = int(knots_ns[0]), int(knots_ns[-1])
+    groups = _groups(leaves)
+    open_end = not _is_whole(leaves, len(knots_ns) - 1)
+    for g, group in enumerate(groups):
+        status = Status(int(group[0]['status']))
+        if g + 1 < len(groups):
+            after = groups[g + 1][0]
+            following = Status(int(after['status']))
+            end_ns = _boundary(status, following, _instant(knots_ns, after, 'start'))
+        elif open_end:
+            end_ns = _boundary(status, Status.SUSPECT, _instant(knots_ns, group[-1], 'end'))
         else:
-            end_ns = int(knots_ns[-1])
+            end_ns = last_ns
         end_ns = max(end_ns, start_ns)
-        if end_ns > start_ns or (len(firsts) == 1 and (not rows or row.status != Status.FREE)):
-            at_ns = None if row.at_ns is None else min(max(row.at_ns, start_ns), end_ns)
-            rows.append(replace(row, start_ns=start_ns, end_ns=end_ns, at_ns=at_ns))
+        alone = len(groups) == 1 and not open_end and (not rows or status != Status.FREE)
+        if end_ns > start_ns or alone:
+            rows.append(
+                _merged(knots_ns, group, status, start_ns, end_ns, link_names, obstacle_names)
+            )
         start_ns = end_ns
+    if open_end:
+        rows.append(Interval(start_ns, last_ns, Status.SUSPECT, Reason.NOT_EXAMINED.value))
     return tuple(rows)
 
 
-def _with_witnesses(ints: np.ndarray, floats: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _groups(leaves: np.ndarray) -> list[np.ndarray]:
+    """Return runs of leaves with one status and one reason."""
+    status, reason = leaves['status'], leaves['reason']
+    if len(leaves) and (status == layout.FREE).all():
+        return [leaves]
+    cuts = np.flatnonzero((status[1:] != status[:-1]) | (reason[1:] != reason[:-1])) + 1
+    bounds = [0, *cuts.tolist(), len(leaves)]
+    return [leaves[a:b] for a, b in pairwise(bounds) if b > a]
+
+
+def _is_whole(leaves: np.ndarray, segments: int) -> bool:
+    """Say whether the leaves reach to the end of the path."""
+    if not len(leaves):
+        return False
+    last = leaves[-1]
+    return bool(last['segment'] == segments - 1 and last['end'] == 1 << int(last['level']))
+
+
+def with_witnesses(leaves: np.ndarray) -> np.ndarray:
     """
     Cut the proved collision out of runs of suspect leaves that contain no other.
 
     A graze shallower than the tolerance is settled before any whole piece of it is proved to
     collide, but the middle of a leaf may be; the widest such middle stands for the run.
+
+    :param leaves: (L,) LEAF in time order.
     """
-    changes = np.flatnonzero(np.diff(ints[:, leaves.STATUS] == leaves.FREE)) + 1
-    bounds = [0, *changes.tolist(), len(ints)]
-    pieces_i, pieces_f, done = [], [], 0
-    for first, last in pairwise(bounds):
-        run = ints[first:last]
-        known = np.flatnonzero(run[:, leaves.WITNESS])
-        if not len(known) or (run[:, leaves.STATUS] == leaves.COLLISION).any():
+    if not leaves['witness'].any():
+        return leaves
+    changes = np.flatnonzero(np.diff(leaves['status'] == layout.FREE)) + 1
+    pieces, done = [], 0
+    for first, last in pairwise([0, *changes.tolist(), len(leaves)]):
+        run = leaves[first:last]
+        known = np.flatnonzero(run['witness'])
+        if not len(known) or (run['status'] == layout.COLLISION).any():
             continue
-        finest = run[known, leaves.LEVEL] + run[known, leaves.WITNESS]
+        finest = run['level'][known] + run['witness'][known]
         row = first + int(known[finest.argmin()])
-        w = int(ints[row, leaves.WITNESS])
-        cut = np.repeat(ints[row : row + 1], 3, axis=0)
-        start = int(ints[row, leaves.START]) << (w + 1)
+        w = int(leaves['witness'][row])
+        cut = np.repeat(leaves[row : row + 1], 3)
+        start = int(leaves['start'][row]) << (w + 1)
         middle = start + (1 << w)
-        cut[:, leaves.START] = start, middle - 1, middle + 1
-        cut[:, leaves.END] = middle - 1, middle + 1, int(ints[row, leaves.END]) << (w + 1)
-        cut[:, leaves.LEVEL] += w + 1
-        cut[1, leaves.STATUS] = leaves.COLLISION
-        pieces_i += [ints[done:row], cut]
-        pieces_f += [floats[done:row], np.repeat(floats[row : row + 1], 3, axis=0)]
+        cut['start'] = start, middle - 1, middle + 1
+        cut['end'] = middle - 1, middle + 1, int(leaves['end'][row]) << (w + 1)
+        cut['level'] += w + 1
+        cut['status'][1] = layout.COLLISION
+        pieces += [leaves[done:row], cut]
         done = row + 1
-    if not pieces_i:
-        return ints, floats
-    return np.concatenate([*pieces_i, ints[done:]]), np.concatenate([*pieces_f, floats[done:]])
+    return np.concatenate([*pieces, leaves[done:]]) if pieces else leaves
 
 
-def _instant(knots_ns: np.ndarray, leaf: np.ndarray, column: int) -> Instant:
+def _instant(knots_ns: np.ndarray, leaf: np.void, end: str) -> Instant:
     """Return an end of a leaf."""
-    segment = int(leaf[leaves.SEGMENT])
+    segment = int(leaf['segment'])
     knot = int(knots_ns[segment])
-    return Instant(
-        knot, int(knots_ns[segment + 1]) - knot, int(leaf[column]), int(leaf[leaves.LEVEL])
-    )
+    return Instant(knot, int(knots_ns[segment + 1]) - knot, int(leaf[end]), int(leaf['level']))
 
 
 def _boundary(left: Status, right: Status, instant: Instant) -> int:
@@ -158,45 +166,42 @@ def _boundary(left: Status, right: Status, instant: Instant) -> int:
 
 def _merged(
     knots_ns: np.ndarray,
-    ints: np.ndarray,
-    floats: np.ndarray,
+    leaves: np.ndarray,
+    status: Status,
+    start_ns: int,
+    end_ns: int,
     link_names: Sequence[str],
     obstacle_names: Sequence[str],
 ) -> Interval:
-    """Return an interval, ends still open, with the pair of the smallest gap among the leaves."""
-    status = _STATUS[int(ints[0, leaves.STATUS])]
+    """Return an interval with the pair of the smallest gap among its leaves."""
     if status == Status.FREE:
-        return Interval(0, 0, status)
-    reason = '' if status == Status.COLLISION else _REASON[int(ints[0, leaves.REASON])].value
-    named = np.flatnonzero(ints[:, leaves.BODY] >= 0)
+        return Interval(start_ns, end_ns, status)
+    reason = '' if status == Status.COLLISION else _REASON[int(leaves[0]['reason'])].value
+    named = leaves[leaves['body'] >= 0]
     if not len(named):
-        return Interval(0, 0, status, reason)
-    worst = int(named[floats[named, leaves.UPPER].argmin()])
-    leaf = ints[worst]
+        return Interval(start_ns, end_ns, status, reason)
+    leaf = named[int(named['upper'].argmin())]
+    segment = int(leaf['segment'])
+    knot = int(knots_ns[segment])
     middle = Instant(
-        *_segment(knots_ns, leaf),
-        int(leaf[leaves.START]) + int(leaf[leaves.END]),
-        int(leaf[leaves.LEVEL]) + 1,
+        knot,
+        int(knots_ns[segment + 1]) - knot,
+        int(leaf['start']) + int(leaf['end']),
+        int(leaf['level']) + 1,
     )
-    x, y, z = floats[worst, leaves.X : leaves.Z + 1].tolist()
+    x, y, z = leaf['place'].tolist()
     return Interval(
-        0,
-        0,
+        start_ns,
+        end_ns,
         status,
         reason,
-        body=link_names[int(leaf[leaves.BODY])],
-        obstacle=obstacle_names[int(leaf[leaves.OBSTACLE])],
-        at_ns=middle.floor_ns,
+        body=link_names[int(leaf['body'])],
+        obstacle=obstacle_names[int(leaf['obstacle'])],
+        at_ns=min(max(middle.floor_ns, start_ns), end_ns),
         location=(x, y, z),
-        gap_lower=_finite(floats[named, leaves.LOWER].min()),
-        gap_upper=_finite(floats[worst, leaves.UPPER]),
+        gap_lower=_finite(named['lower'].min()),
+        gap_upper=_finite(leaf['upper']),
     )
-
-
-def _segment(knots_ns: np.ndarray, leaf: np.ndarray) -> tuple[int, int]:
-    """Return start and length of a leaf's segment [ns]."""
-    segment = int(leaf[leaves.SEGMENT])
-    return int(knots_ns[segment]), int(knots_ns[segment + 1]) - int(knots_ns[segment])
 
 
 def _finite(value: float) -> float | None:

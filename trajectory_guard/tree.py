@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajectory_guard.body import rigid_defect, RIGID_TOLERANCE
-from trajectory_guard.kernels.chain import Chain, PRISMATIC, REVOLUTE
+from trajectory_guard.kernels.layout import Chain, PRISMATIC, REVOLUTE
 from trajectory_guard.robot import Joint, JointType, Robot
 
 

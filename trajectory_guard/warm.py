@@ -8,16 +8,13 @@ import numpy as np
 from trajectory_guard.body import ConvexBody
 from trajectory_guard.certify import judge
 from trajectory_guard.errors import Reason, TrajectoryGuardError
-from trajectory_guard.kernels.jit import FOLDER
+from trajectory_guard.kernels.compiled import COMPILING, is_cold
 from trajectory_guard.result import Verdict
 from trajectory_guard.scene import Obstacle, Scene
 from trajectory_guard.trajectory import Point, Trajectory
 from trajectory_guard.urdf import robot_from_urdf
 from trajectory_guard.workcell import Workcell
 
-COMPILING = 'compiling the kernels (once; about half a minute)'
-
-# Every kind of joint and solid shares the same kernels, so one of each is enough.
 _ROBOT = """
 <robot name="warm_up">
   <link name="base"/>
@@ -25,11 +22,6 @@ _ROBOT = """
   <joint name="elbow" type="continuous"><parent link="base"/><child link="arm"/></joint>
 </robot>
 """
-
-
-def is_cold() -> bool:
-    """Say whether the kernels have yet to be compiled on this machine."""
-    return FOLDER is None or next(FOLDER.rglob('*.nbi'), None) is None
 
 
 def warm_up() -> None:

@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from trajectory_guard.errors import Reason, RobotError, SceneError
-from trajectory_guard.kernels.margin import UP
-from trajectory_guard.kernels.solids import FAR, NODE, Solids
-from trajectory_guard.pack import perpendicular, solids
+from trajectory_guard.kernels.layout import Extents, FAR, NODE, Packed, Solids, UP
+from trajectory_guard.pack import boxes, perpendicular, solids
 from trajectory_guard.robot import Robot
 from trajectory_guard.scene import Scene
 from trajectory_guard.tree import Tree, tree
@@ -21,13 +20,13 @@ class Pairs:
     """
     Which bodies a set of commanded joints moves against which obstacles.
 
-    :param checked: (P, 2) int64: packed body and packed obstacle of every pair to check.
-    :param still: (Q, 2) int64: the pairs that the joints do not move.
+    :param moving: (M,) int64: packed bodies to check against every obstacle.
+    :param still: (Q, 2) int64: body and obstacle of the pairs that the joints do not move.
     :param count: number of pairs of a link and an obstacle among the first.
     :param unchecked: what is left out, in words.
     """
 
-    checked: np.ndarray
+    moving: np.ndarray
     still: np.ndarray
     count: int
     unchecked: tuple[str, ...]
@@ -54,9 +53,7 @@ class Workcell:
     link_names: tuple[str, ...] = field(init=False)
     obstacle_names: tuple[str, ...] = field(init=False)
     link_nodes: np.ndarray = field(init=False)
-    extent: np.ndarray = field(init=False)
-    perpendicular: np.ndarray = field(init=False)
-    offsets: np.ndarray = field(init=False)
+    packed: Packed = field(init=False, repr=False)
     _pairs: dict[bytes, Pairs] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -92,9 +89,15 @@ class Workcell:
         keep('link_nodes', self.links.ranges[:, NODE].copy())
         # The culls move a body's centre, which may lie farther out than its vertices.
         out = np.array([np.linalg.norm(body.center) for body in bodies]) * UP
-        keep('extent', np.maximum(self.links.size[:, FAR], out))
-        keep('perpendicular', np.array([perpendicular(body) for body in bodies]))
-        keep('offsets', np.array([folded.link_path[name] for name in names]))
+        extents = Extents(
+            extent=np.maximum(self.links.size[:, FAR], out),
+            perpendicular=np.array([perpendicular(body) for body in bodies]),
+            offsets=np.array([folded.link_path[name] for name in names]),
+        )
+        keep(
+            'packed',
+            Packed(folded.chain, self.links, self.obstacles, boxes(self.obstacles), extents),
+        )
         keep('robot_hash', self.robot.digest())
         keep('scene_hash', self.scene.digest)
 
@@ -130,7 +133,7 @@ class Workcell:
         unchecked = ['links of the robot against each other']
         unchecked += [f'{link} against the scene: no joint moves it' for link in still_links]
         return Pairs(
-            checked=_product(moving, len(self.obstacle_names)),
+            moving=moving,
             still=_product(still, len(self.obstacle_names)),
             count=len(moving_links) * len(self.scene.obstacles),
             unchecked=tuple(unchecked),

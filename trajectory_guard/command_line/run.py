@@ -47,7 +47,7 @@ def _run(request: Request, json: bool) -> ExitCode:
     from trajectory_guard.command_line.answer import answers
     from trajectory_guard.command_line.json_lines import JsonLines
     from trajectory_guard.command_line.report import Report
-    from trajectory_guard.warm import COMPILING, is_cold
+    from trajectory_guard.kernels.compiled import COMPILING, is_cold
 
     if request.self_collision:
         _say(f'note: {SELF_COLLISION_WARNING}')

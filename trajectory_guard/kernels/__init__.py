@@ -1,17 +1,18 @@
 """
-Numba functions on arrays: no objects, no exceptions, no allocation that a caller does not see.
+The certifier's inner loops, in C++: plain structures of arrays in, leaves and entries out.
 
-Layer contract.  A kernel takes arrays that the core has validated (finite, contiguous float64 or
-int64), writes into arrays of the caller and returns numbers.  Arithmetic is IEEE double with
-``error_model='numpy'`` and without any fast-math flag, so NaN and infinity propagate, and every
-comparison that certifies is written so that NaN fails it.
+Layer contract.  A kernel takes arrays that the core has validated (finite, contiguous, of the
+shapes that ``layout`` names), keeps no pointer beyond the call and raises nothing; it runs without
+the interpreter's lock, and the same question has the same answer to the bit on any thread and on
+any processor.  Arithmetic is IEEE double without contraction and without any fast-math flag, so
+NaN and infinity propagate, and every comparison that certifies is written so that NaN fails it.
 
-*Trusted* (a wrong line here could call a collision free): the motion in ``piece``, ``chain``,
-``economised`` and ``enclosure``; lever arms in ``reach``; the inequalities in ``separation`` and
-``cull``; rounding in ``margin``; the books in ``cover``, ``pair`` and ``leaf``; for collisions
-``witness``.  *Untrusted*, may only propose: ``gjk`` and the search in ``deepest``.
+*Trusted* (a wrong line here could call a collision free): the motion in ``piece.hpp``,
+``economised.hpp``, ``rational.hpp`` and ``motion.hpp``; lever arms in ``reach.hpp``; the
+inequalities in ``separation.hpp`` and ``cull.hpp``; rounding in ``margin.hpp``; the books in
+``cover.hpp``, ``pair.hpp`` and ``leaf.hpp``; for collisions ``witness.hpp`` and the depths of
+``deepest.hpp``.  *Untrusted*, may only propose: ``gjk.hpp`` and the search in ``deepest.hpp``.
 
-Shared conventions: a pose is 12 numbers, the rows of a 3x4 matrix ``[R | t]``; ``tau`` runs over
-[-1, 1] on a piece; a *node* is a movable joint, its frame moves with the joint and has the joint
-axis as z.
+Shared conventions: ``tau`` runs over [-1, 1] on a piece; a *node* is a movable joint, its frame
+moves with the joint and has the joint axis as z.
 """

@@ -1,0 +1,157 @@
+// A point deep inside both solids at one instant (search), and how deep it is (trusted for G3).
+//
+// Maximise t subject to a.y + t <= d over the faces of both solids: the centre of the largest common
+// ball of two polytopes. Dual simplex on a 4x4 basis: start from an artificial tetrahedron, bring in
+// the most violated face, drop the one that keeps the multipliers positive. The optimum only falls,
+// so t <= 0 ends the search. The multipliers of the link's faces add up to the direction in which
+// the two are least entangled.
+#pragma once
+
+#include <vector>
+
+#include "motion.hpp"
+
+namespace guard {
+
+constexpr int PIVOTS = 60;
+
+// Rows (n, d) of a polytope's faces, one array a column.
+struct Faces {
+  const double *x, *y, *z, *d;
+  int64_t count;  // in whole vectors
+};
+
+inline Faces faces_of(const Solids& solids, int64_t b) {
+  const double* x = solids.faces + solids.range(b, FACE_FIRST);
+  return {x, x + solids.face_stride, x + 2 * solids.face_stride, x + 3 * solids.face_stride,
+          solids.range(b, FACE_LAST) - solids.range(b, FACE_FIRST)};
+}
+
+// How deep a point lies inside a polytope, min (d - n.x), negative outside [m]; minus infinity
+// without faces and for NaN.
+inline double depth(const Faces& faces, const double* x) {
+  Lanes best = all(INFINITY);
+  Mask lost = {};
+  for (int64_t f = 0; f < faces.count; f += LANES) {
+    Lanes inside = load(faces.d + f) - load(faces.x + f) * x[0] - load(faces.y + f) * x[1] -
+                   load(faces.z + f) * x[2];
+    lost |= inside != inside;
+    best = inside < best ? inside : best;
+  }
+  return faces.count == 0 || any(lost) ? -INFINITY : least(best);
+}
+
+// The face that (x, t) violates most, if by more than `worst`, which is raised.
+inline bool most_violated(const Faces& faces, const double* x, double t, double& worst, int64_t& f) {
+  Lanes most = all(-INFINITY);
+  Mask where = {}, now = {0, 1, 2, 3, 4, 5, 6, 7};
+  for (int64_t i = 0; i < faces.count; i += LANES, now += LANES) {
+    Lanes excess = load(faces.x + i) * x[0] + load(faces.y + i) * x[1] + load(faces.z + i) * x[2] +
+                   t - load(faces.d + i);
+    where = excess > most ? now : where;
+    most = excess > most ? excess : most;
+  }
+  bool found = false;
+  for (int i = 0; i < LANES; i++)
+    if (most[i] > worst) {
+      worst = most[i];
+      f = where[i];
+      found = true;
+    }
+  return found;
+}
+
+// What the search found at one instant.
+struct Common {
+  double point[3];      // in the node frame [m]
+  double direction[3];  // from the obstacle towards the link, root frame; zero if none
+  double place[3];      // of the point in the root frame [m]
+  double mine, theirs;  // its depth in the link and in the obstacle [m]
+};
+
+// Propose a point deep inside a link and an obstacle at one pose; true if it is inside both.
+//
+// moved: scratch for the obstacle's faces in the node frame. enough: stop when a common ball of this
+// part of the best possible radius is found.
+inline bool deepest(const double* pose, const Solids& links, int64_t b, const Solids& obstacles,
+                    int64_t o, std::vector<double>& moved, Common& out) {
+  Faces mine = faces_of(links, b), world = faces_of(obstacles, o);
+  for (int r = 0; r < 3; r++) out.point[r] = out.direction[r] = 0.0;
+  if (mine.count == 0 || world.count == 0) return false;
+  moved.resize(4 * world.count);
+  double* row = moved.data();
+  Faces theirs{row, row + world.count, row + 2 * world.count, row + 3 * world.count, world.count};
+  for (int64_t f = 0; f < world.count; f += LANES) {
+    Lanes x = load(world.x + f), y = load(world.y + f), z = load(world.z + f);
+    for (int c = 0; c < 3; c++)
+      store(row + c * world.count + f, x * pose[4 * c] + y * pose[4 * c + 1] + z * pose[4 * c + 2]);
+    store(row + 3 * world.count + f,
+          load(world.d + f) - (x * pose[12] + y * pose[13] + z * pose[14]));
+  }
+  double radius = links.length(b, CORE) + links.length(b, BALL);
+  const double* c = links.at(b, CENTRE);
+  // A regular tetrahedron around the solid, multipliers 1/4 each. The rows (n, 1), n corners of a
+  // cube over sqrt(3), are orthogonal: their inverse is known.
+  static const double CORNER[4][3] = {{1, 1, 1}, {-1, -1, 1}, {-1, 1, -1}, {1, -1, -1}};
+  double basis[4][4], value[4], inverse[4][4], weight[4], shares[4];
+  bool own[4] = {false, false, false, false};
+  for (int k = 0; k < 4; k++) {
+    value[k] = 4.0 * radius;
+    for (int r = 0; r < 3; r++) {
+      basis[k][r] = CORNER[k][r] / std::sqrt(3.0);
+      value[k] += basis[k][r] * c[r];
+      inverse[r][k] = 0.75 * basis[k][r];
+    }
+    basis[k][3] = 1.0;
+    inverse[3][k] = 0.25;
+    weight[k] = 0.25;
+  }
+  double x[4] = {0.0, 0.0, 0.0, 0.0};
+  for (int pivot = 0; pivot < PIVOTS; pivot++) {
+    for (int r = 0; r < 4; r++)
+      x[r] = inverse[r][0] * value[0] + inverse[r][1] * value[1] + inverse[r][2] * value[2] +
+             inverse[r][3] * value[3];
+    double worst = 1e-12 * radius;
+    int64_t f = 0;
+    bool any_mine = most_violated(mine, x, x[3], worst, f);
+    bool any_theirs = most_violated(theirs, x, x[3], worst, f);
+    if (!(any_mine || any_theirs) || !(x[3] > 0.0)) break;
+    const Faces& from = any_theirs ? theirs : mine;
+    double a[4] = {from.x[f], from.y[f], from.z[f], 1.0};
+    int leave = -1;
+    double ratio = INFINITY;
+    for (int k = 0; k < 4; k++) {
+      shares[k] = a[0] * inverse[0][k] + a[1] * inverse[1][k] + a[2] * inverse[2][k] + inverse[3][k];
+      if (shares[k] > 1e-12 && weight[k] / shares[k] < ratio) {
+        ratio = weight[k] / shares[k];
+        leave = k;
+      }
+    }
+    if (leave < 0) break;
+    for (int k = 0; k < 4; k++) weight[k] -= ratio * shares[k];
+    weight[leave] = ratio;
+    for (int r = 0; r < 4; r++) inverse[r][leave] /= shares[leave];
+    for (int k = 0; k < 4; k++)
+      if (k != leave)
+        for (int r = 0; r < 4; r++) inverse[r][k] -= shares[k] * inverse[r][leave];
+    for (int r = 0; r < 4; r++) basis[leave][r] = a[r];
+    value[leave] = from.d[f];
+    own[leave] = !any_theirs;
+  }
+  for (int r = 0; r < 3; r++) out.point[r] = x[r];
+  double g[3] = {0.0, 0.0, 0.0}, n[3];
+  for (int k = 0; k < 4; k++)
+    if (own[k])
+      for (int r = 0; r < 3; r++) g[r] -= weight[k] * basis[k][r];
+  for (int r = 0; r < 3; r++) n[r] = pose[r] * g[0] + pose[4 + r] * g[1] + pose[8 + r] * g[2];
+  double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+  if (length > 1e-9)
+    for (int r = 0; r < 3; r++) out.direction[r] = n[r] / length;
+  if (!(x[3] > 0.0)) return false;
+  image(pose, out.point, out.place);
+  out.mine = depth(mine, out.point);
+  out.theirs = depth(world, out.place);
+  return true;
+}
+
+}  // namespace guard

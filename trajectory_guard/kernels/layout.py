@@ -1,0 +1,249 @@
+"""The structures of ``values.hpp``, ``leaf.hpp`` and ``proof.hpp`` as Python sees them."""
+
+import ctypes
+from typing import Any, NamedTuple
+
+import numpy as np
+
+# Kinds of joints.
+REVOLUTE = 0
+PRISMATIC = 1
+
+TERMS = 6  # coefficients of a quintic
+LANES = 8
+
+# Columns of `Solids.ranges`.
+FIRST, LAST, FACE_FIRST, FACE_LAST, NODE = range(5)
+# Columns of `Solids.size` [m]: ball, disc, sphere around vertices and disc, farthest point.
+BALL, DISC, CORE, FAR = range(4)
+# Columns of `Solids.place`: disc normal, sphere centre, box half sides, pose of the box (12).
+AXIS, CENTRE, HALF, BOX = 0, 3, 6, 9
+
+# Sums of at most a few dozen non-negative terms, each rounded: multiply by this to round upward.
+UP = 1.0 + 2.0**-44
+
+# How a motion is built.
+ECONOMISED = 0  # polynomials of degree 5 in the space of affine displacements: fast
+RATIONAL = 1  # exact rational curves: audits, free bodies
+
+# Status of a leaf; the values of `result.Status`.
+FREE, SUSPECT, COLLISION = 1, 2, 3
+# Why a leaf is suspect.
+BY_TOLERANCE, BY_DEPTH, BY_BUDGET, BY_STOP, BY_SCOPE = range(5)
+# Kinds of proof entries.
+BALLS_APART, PLANE_BETWEEN, PLANE_TURNING = range(3)
+
+# The leaf [start, end] / 2^level of a segment, see ``leaf.hpp``; lengths in m.
+LEAF = np.dtype(
+    [(name, np.int64) for name in ('segment', 'start', 'end', 'level', 'status', 'reason')]
+    + [(name, np.int64) for name in ('body', 'obstacle', 'witness', 'piece')]
+    + [('lower', float), ('upper', float), ('place', float, 3), ('depth', float), ('near', float)]
+    + [('y0', float, 3), ('y1', float, 3)]
+)
+PIECE = np.dtype([('segment', np.int64), ('numerator', np.int64), ('level', np.int64)])
+ENTRY = np.dtype(
+    [(name, np.int64) for name in ('kind', 'piece', 'body', 'obstacle')]
+    + [('n', float, 3), ('m', float, 3), ('offset', float)]
+)
+
+
+class Chain(NamedTuple):
+    """
+    The movable joints of a robot.
+
+    :param parent: (n,) int64 node above, -1 for the root; parents come before children.
+    :param kind: (n,) int64, REVOLUTE or PRISMATIC.
+    :param transform: (n, 12) rows of [R | t]: constant pose of the node, before its own motion, in
+        its parent node's frame [m].
+    :param depth: (n,) int64 number of rounded transforms from the root down to this node.
+    """
+
+    parent: np.ndarray
+    kind: np.ndarray
+    transform: np.ndarray
+    depth: np.ndarray
+
+
+class Solids(NamedTuple):
+    """
+    Convex solids conv(vertices) + disc + ball, each in its own frame (links: node frame).
+
+    Vertices and faces of a solid are padded to whole vectors of eight with copies.
+
+    :param ranges: (B, 5) int64: FIRST:LAST vertices, FACE_FIRST:FACE_LAST faces, NODE that
+        carries the solid (-1: the root).
+    :param size: (B, 4): BALL radius, DISC radius, CORE radius of the sphere around vertices and
+        disc, FAR the largest distance of the solid from the frame's origin [m].
+    :param place: (B, 21): AXIS unit normal of the disc, CENTRE of the CORE sphere, HALF sides and
+        pose BOX of an oriented box that contains vertices and disc [m].
+    :param vertices: (3, V) [m].
+    :param faces: (4, F) rows n, d: halfspaces n.x <= d of an inscribed polytope.
+    """
+
+    ranges: np.ndarray
+    size: np.ndarray
+    place: np.ndarray
+    vertices: np.ndarray
+    faces: np.ndarray
+
+
+class Boxes(NamedTuple):
+    """
+    The oriented boxes of the obstacles in blocks of eight, and a tree of bounds over the blocks.
+
+    :param box: (K, 17, 8) per lane: axes by columns (9), centre, half sides, ball, farthest [m].
+    :param obstacle: (K, 8) int64 obstacle of each lane, -1 where there is none.
+    :param bounds: (N, 6) least and largest corner of all solids below a node of the tree [m].
+    :param branch: (N, 2) int64: two nodes, or -1 and a block; the root is node 0.
+    """
+
+    box: np.ndarray
+    obstacle: np.ndarray
+    bounds: np.ndarray
+    branch: np.ndarray
+
+
+class Extents(NamedTuple):
+    """
+    How far each body reaches.
+
+    :param extent: (B,) largest distance of a body from its node's origin [m].
+    :param perpendicular: (B,) the same from its node's axis [m].
+    :param offsets: (B,) sum of the lengths of all joint origins down to the body [m].
+    """
+
+    extent: np.ndarray
+    perpendicular: np.ndarray
+    offsets: np.ndarray
+
+
+class Path(NamedTuple):
+    """
+    The joint path of a request, joints in node order.
+
+    :param coefficients: (S, n, 6) powers of s on [0, 1] of each segment [rad or m].
+    :param rounding: (S, n) bound on the error of the coefficients together [rad or m].
+    :param slack: (n,) tracking tolerance [rad or m].
+    :param travel: (n,) bound on |q| of a slide over path and tolerance, else zero [m].
+    """
+
+    coefficients: np.ndarray
+    rounding: np.ndarray
+    slack: np.ndarray
+    travel: np.ndarray
+
+
+_P = ctypes.c_void_p
+_I = ctypes.c_int64
+_D = ctypes.c_double
+
+
+def _structure(name: str, **fields: Any) -> type[ctypes.Structure]:
+    return type(name, (ctypes.Structure,), {'_fields_': list(fields.items())})
+
+
+_Chain = _structure('Chain', nodes=_I, parent=_P, kind=_P, transform=_P, depth=_P)
+_Solids = _structure(
+    'Solids',
+    count=_I,
+    ranges=_P,
+    size=_P,
+    place=_P,
+    vertices=_P,
+    vertex_stride=_I,
+    faces=_P,
+    face_stride=_I,
+)
+_Boxes = _structure(
+    'Boxes', blocks=_I, box=_P, obstacle=_P, nodes=_I, bounds=_P, branch=_P, far=_D
+)
+_Path = _structure('Path', segments=_I, coefficients=_P, rounding=_P, slack=_P, travel=_P)
+_Extents = _structure('Extents', extent=_P, perpendicular=_P, offsets=_P)
+Request = _structure(
+    'Request',
+    tolerance=_D,
+    clearance=_D,
+    max_pieces=_I,
+    scope=_I,
+    want_proof=_I,
+    bodies=_P,
+    body_count=_I,
+)
+Answer = _structure(
+    'Answer',
+    leaf_count=_I,
+    entry_count=_I,
+    piece_count=_I,
+    pieces=_I,
+    leaves=_P,
+    entries=_P,
+    proved_on=_P,
+)
+Piece = _structure('Piece', segment=_I, numerator=_I, level=_I)
+
+
+def address(array: np.ndarray) -> int:
+    """Return where the first entry of a contiguous array lies; the array must outlive its use."""
+    return array.__array_interface__['data'][0]
+
+
+def _checked(array: np.ndarray, dtype: type) -> int:
+    if array.dtype != dtype or not array.flags.c_contiguous:
+        raise TypeError(f'expected a contiguous array of {dtype}, got {array.dtype}')
+    return address(array)
+
+
+class Packed:
+    """
+    Robot and scene as the kernels take them; holds the arrays that the structures point to.
+
+    :param chain: joints.
+    :param links: bodies of the robot.
+    :param obstacles: bodies of the scene.
+    :param boxes: their boxes.
+    :param extents: how far the links reach.
+    :raises TypeError: an array is not contiguous or has another type.
+    """
+
+    def __init__(
+        self, chain: Chain, links: Solids, obstacles: Solids, boxes: Boxes, extents: Extents
+    ) -> None:
+        self._held = chain, links, obstacles, boxes, extents
+        ints = np.int64
+        self.chain = _Chain(
+            len(chain.parent),
+            _checked(chain.parent, ints),
+            _checked(chain.kind, ints),
+            _checked(chain.transform, float),
+            _checked(chain.depth, ints),
+        )
+        self.links = _solids(links)
+        self.obstacles = _solids(obstacles)
+        self.boxes = _Boxes(
+            len(boxes.box),
+            _checked(boxes.box, float),
+            _checked(boxes.obstacle, ints),
+            len(boxes.bounds),
+            _checked(boxes.bounds, float),
+            _checked(boxes.branch, ints),
+            float(obstacles.size[:, FAR].max()),
+        )
+        self.extents = _Extents(*(_checked(array, float) for array in extents))
+
+
+def _solids(solids: Solids) -> ctypes.Structure:
+    return _Solids(
+        len(solids.ranges),
+        _checked(solids.ranges, np.int64),
+        _checked(solids.size, float),
+        _checked(solids.place, float),
+        _checked(solids.vertices, float),
+        solids.vertices.shape[1],
+        _checked(solids.faces, float),
+        solids.faces.shape[1],
+    )
+
+
+def path_structure(path: Path) -> ctypes.Structure:
+    """Return a path as the kernels take it; its arrays must outlive the structure."""
+    return _Path(len(path.coefficients), *(_checked(array, float) for array in path))

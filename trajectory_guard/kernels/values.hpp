@@ -1,0 +1,79 @@
+// What the core hands to the kernels: plain structures of read-only arrays, checked by the core.
+#pragma once
+
+#include <cstdint>
+
+#include "vector.hpp"
+
+namespace guard {
+
+// Kinds of joints.
+constexpr int64_t REVOLUTE = 0, PRISMATIC = 1;
+
+// Columns of Solids::ranges. Vertices and faces are padded to whole vectors with copies.
+enum { FIRST, LAST, FACE_FIRST, FACE_LAST, NODE, RANGES };
+// Columns of Solids::size [m]: ball, disc, sphere around vertices and disc, farthest point.
+enum { BALL, DISC, CORE, FAR, SIZES };
+// Columns of Solids::place: disc normal, sphere centre, box half sides, pose of the box (12).
+enum { AXIS = 0, CENTRE = 3, HALF = 6, BOX = 9, PLACES = 21 };
+
+constexpr int TERMS = 6;  // coefficients of a quintic
+
+// The movable joints of a robot. A node's frame moves with its joint and has the axis as z.
+struct Chain {
+  int64_t nodes;
+  const int64_t* parent;    // (n,) node above, -1 for the root; parents come first
+  const int64_t* kind;      // (n,) REVOLUTE or PRISMATIC
+  const double* transform;  // (n, 12) rows of [R | t]: the node before its motion, in its parent
+  const int64_t* depth;     // (n,) rounded transforms between the root and the node
+};
+
+// Convex solids conv(vertices) + disc + ball, end to end; links in node frames, obstacles in the
+// root frame.
+struct Solids {
+  int64_t count;
+  const int64_t* ranges;   // (B, RANGES)
+  const double* size;      // (B, SIZES)
+  const double* place;     // (B, PLACES)
+  const double* vertices;  // (3, V) [m]
+  int64_t vertex_stride;
+  const double* faces;  // (4, F) rows n, d: halfspaces n.x <= d of an inscribed polytope
+  int64_t face_stride;
+
+  int64_t range(int64_t b, int column) const { return ranges[b * RANGES + column]; }
+  double length(int64_t b, int column) const { return size[b * SIZES + column]; }
+  const double* at(int64_t b, int column) const { return place + b * PLACES + column; }
+};
+
+// Lanes of a block of Boxes: the rotation by columns, the centre, the half sides, the ball and
+// the farthest point of the obstacle.
+enum { BOX_AXES = 0, BOX_CENTRE = 9, BOX_HALF = 12, BOX_BALL = 15, BOX_FAR = 16, BOX_ROWS = 17 };
+
+// The oriented boxes of the obstacles in blocks of eight, and a tree of bounds over the blocks.
+struct Boxes {
+  int64_t blocks;
+  const double* box;        // (blocks, BOX_ROWS, 8)
+  const int64_t* obstacle;  // (blocks, 8), -1 where there is none
+  int64_t nodes;
+  const double* bounds;   // (nodes, 6) least and largest corner of all below, balls included [m]
+  const int64_t* branch;  // (nodes, 2) two nodes, or -1 and a block
+  double far;             // the largest BOX_FAR
+};
+
+// The joint path of a request, joints in node order.
+struct Path {
+  int64_t segments;
+  const double* coefficients;  // (S, n, TERMS) powers of s on [0, 1] [rad or m]
+  const double* rounding;      // (S, n) bound on the error of the coefficients together
+  const double* slack;         // (n,) tracking tolerance [rad or m]
+  const double* travel;        // (n,) bound on |q| of a slide, tolerance included [m]
+};
+
+// How far each body reaches.
+struct Extents {
+  const double* extent;         // (B,) largest distance from the node's origin [m]
+  const double* perpendicular;  // (B,) the same from the node's axis [m]
+  const double* offsets;        // (B,) sum of the lengths of all joint origins down to the body [m]
+};
+
+}  // namespace guard
