@@ -4,15 +4,16 @@ from collections.abc import Sequence
 import dataclasses
 import logging
 import time
+from typing import NamedTuple
 
 import numpy as np
 
+from trajectory_guard.certificate import certificate
 from trajectory_guard.deadline import stop_flag
 from trajectory_guard.errors import Reason, TrajectoryGuardError
 from trajectory_guard.joint_path import INTERPOLATION, joint_path, JointPath
-from trajectory_guard.kernels.cover import cover
+from trajectory_guard.kernels.cover import cover, Covered
 from trajectory_guard.kernels.layout import Path
-from trajectory_guard.kernels.touching import touching
 from trajectory_guard.request import check_joints, motion_path, tracking_slack
 from trajectory_guard.result import Interval, NANOSECONDS, Result, Status, Verdict
 from trajectory_guard.settings import Settings
@@ -21,6 +22,14 @@ from trajectory_guard.trajectory import JointState, Trajectory
 from trajectory_guard.workcell import Pairs, Workcell
 
 _log = logging.getLogger(__name__)
+
+
+class _Answer(NamedTuple):
+    """A result and what it was made of."""
+
+    result: Result
+    leaves: np.ndarray
+    covered: Covered
 
 
 def certify(
@@ -34,17 +43,23 @@ def certify(
 
     :param workcell: robot and scene.
     :param path: the motion of every movable joint of that robot.
-    :param settings: what is asked; the defaults if None.
+    :param settings: what is asked; the defaults if None. A certificate speaks of a trajectory, so
+        only `judge` writes one.
     :param slack: (n,) tracking tolerance per movable joint [rad or m]; None: the one value
         of ``settings`` for every joint of the path.
     :returns: intervals that partition [0, duration] and the verdict.
     :raises TrajectoryGuardError: the path does not fit the robot, or moves nothing that could hit.
     """
     settings = settings or Settings()
-    begin = time.perf_counter()
-    check_joints(workcell.robot.movable, path)
     if slack is None:
         slack = tracking_slack(workcell.robot.movable, path, (), settings)
+    return _answer(workcell, path, settings, slack, time.perf_counter()).result
+
+
+def _answer(
+    workcell: Workcell, path: JointPath, settings: Settings, slack: np.ndarray, begin: float
+) -> _Answer:
+    check_joints(workcell.robot.movable, path)
     pairs = workcell.pairs(path.in_path)
     motion = motion_path(workcell, path, slack)
     with stop_flag(settings.deadline_ns) as stop:
@@ -68,7 +83,7 @@ def certify(
         path.unknown_until_ns,
     )
     verdict, reason, message = _verdict(rows)
-    return Result(
+    result = Result(
         verdict=verdict,
         reason_code=reason,
         message=message,
@@ -85,6 +100,7 @@ def certify(
         warnings=_warnings(workcell, motion, pairs, path),
         duration_ns=path.duration_ns,
     )
+    return _Answer(result, leaves, covered)
 
 
 def judge(
@@ -102,6 +118,7 @@ def judge(
     :param settings: what is asked; the defaults if None.
     """
     settings = settings or Settings()
+    begin = time.perf_counter()
     try:
         movable = workcell.robot.movable
         path = joint_path(
@@ -114,14 +131,17 @@ def judge(
             allow_nonzero_end_velocity=settings.allow_nonzero_end_velocity,
         )
         slack = tracking_slack(movable, path, trajectory.joint_names, settings)
-        result = certify(workcell, path, settings, slack)
+        answer = _answer(workcell, path, settings, slack, begin)
+        proof = None
+        if settings.want_certificate:
+            proof = certificate(workcell, trajectory, start, path, slack, *answer)
     except TrajectoryGuardError as error:
         return Result.rejected(error, settings, trajectory.name)
     except Exception as error:  # fail closed: an unforeseen error must not leave a request open
         _log.exception('certification of %r failed', trajectory.name)
         internal = TrajectoryGuardError(Reason.INTERNAL_ERROR, f'internal error: {error!r}')
         return Result.rejected(internal, settings, trajectory.name)
-    return dataclasses.replace(result, name=trajectory.name)
+    return dataclasses.replace(answer.result, name=trajectory.name, certificate=proof)
 
 
 def _verdict(rows: Sequence[Interval]) -> tuple[Verdict, str, str]:
@@ -148,16 +168,7 @@ def _verdict(rows: Sequence[Interval]) -> tuple[Verdict, str, str]:
 def _warnings(workcell: Workcell, motion: Path, pairs: Pairs, path: JointPath) -> tuple[str, ...]:
     """Return what the verdict does not say: parts that touch without moving, limits unchecked."""
     warnings = []
-    touch = touching(workcell.packed, motion, pairs.still)
-    names = sorted(
-        {
-            (
-                workcell.link_names[pairs.still[i, 0]],
-                workcell.obstacle_names[pairs.still[i, 1]],
-            )
-            for i in np.flatnonzero(touch)
-        }
-    )
+    names = sorted(pairs.touching | workcell.touching(pairs.still, motion))
     if names:
         listed = ', '.join(f'{body} and {obstacle}' for body, obstacle in names)
         warnings.append(f'touching, but not moved by the trajectory, so not judged: {listed}')

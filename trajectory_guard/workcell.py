@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from trajectory_guard.errors import Reason, RobotError, SceneError
-from trajectory_guard.kernels.layout import Extents, FAR, NODE, Packed, Solids, UP
+from trajectory_guard.kernels.layout import Extents, FAR, NODE, Packed, Path, Solids, UP
+from trajectory_guard.kernels.touching import touching
 from trajectory_guard.pack import boxes, perpendicular, solids
 from trajectory_guard.robot import Robot
 from trajectory_guard.scene import Scene
@@ -21,13 +22,15 @@ class Pairs:
     Which bodies a set of commanded joints moves against which obstacles.
 
     :param moving: (M,) int64: packed bodies to check against every obstacle.
-    :param still: (Q, 2) int64: body and obstacle of the pairs that the joints do not move.
+    :param still: (Q, 2) int64: body and obstacle of the pairs that stand where joints hold them.
+    :param touching: names of the pairs that no joint at all moves and that touch.
     :param count: number of pairs of a link and an obstacle among the first.
     :param unchecked: what is left out, in words.
     """
 
     moving: np.ndarray
     still: np.ndarray
+    touching: frozenset[tuple[str, str]]
     count: int
     unchecked: tuple[str, ...]
 
@@ -116,6 +119,20 @@ class Workcell:
                 self._pairs[key] = pairs
         return pairs
 
+    def touching(self, pairs: np.ndarray, path: Path) -> frozenset[tuple[str, str]]:
+        """
+        Return the names of the pairs that touch at a path's first instant.
+
+        :param pairs: (Q, 2) int64: body and obstacle.
+        :param path: the joint path.
+        """
+        if not len(pairs):
+            return frozenset()
+        touch = touching(self.packed, path, pairs)
+        return frozenset(
+            (self.link_names[b], self.obstacle_names[o]) for b, o in pairs[touch].tolist()
+        )
+
     def _pair_up(self, in_path: np.ndarray) -> Pairs:
         moved = np.zeros(len(in_path), bool)
         for j, parent in enumerate(self.tree.chain.parent):
@@ -134,10 +151,20 @@ class Workcell:
         unchecked += [f'{link} against the scene: no joint moves it' for link in still_links]
         return Pairs(
             moving=moving,
-            still=_product(still, len(self.obstacle_names)),
+            still=_product(still[self.link_nodes[still] >= 0], len(self.obstacle_names)),
+            touching=self.touching(
+                _product(still[self.link_nodes[still] < 0], len(self.obstacle_names)),
+                _standing(len(in_path)),
+            ),
             count=len(moving_links) * len(self.scene.obstacles),
             unchecked=tuple(unchecked),
         )
+
+
+def _standing(joints: int) -> Path:
+    """Return a path on which nothing moves."""
+    none = np.zeros(joints)
+    return Path(np.zeros((1, joints, 6)), np.zeros((1, joints)), none, none)
 
 
 def _product(bodies: np.ndarray, obstacles: int) -> np.ndarray:

@@ -1,10 +1,10 @@
 // Cover the motion with pieces that are closed by proof (trusted bookkeeping).
 //
 // A time tree is walked, depth first in time order, or breadth first if only the verdict is asked
-// for. A piece starts with the pairs its parent could not close (a whole segment with all of them);
-// each pair is tried from cheap to dear, and what stays open goes to both halves. A pair proved on
-// an interval is proved on all of its parts, so the enclosures of the halves may be fitted afresh. A
-// piece ends as
+// for. A piece starts with the pairs its parent could not close (a whole segment with all of
+// them); each pair is tried from cheap to dear, and what stays open goes to both halves. A pair
+// proved on an interval is proved on all of its parts, so the enclosures of the halves may be
+// fitted afresh. A piece ends as
 //
 // * FREE when no pair is open: every pair was closed on it or on a piece that contains it;
 // * COLLISION when one pair provably overlaps at every instant of it;
@@ -47,8 +47,8 @@ inline bool settled(const Known& known, double limit, double sweep, double toler
 
 // Return w such that the middle 2^-w of a piece provably collides, 0 if none is known.
 //
-// A point common to both solids at the centre by `depth` in all stays common until the link has moved
-// by that much, and it moves at most linearly in the time from the centre.
+// A point common to both solids at the centre by `depth` in all stays common until the link has
+// moved by that much, and it moves at most linearly in the time from the centre.
 inline int64_t witness_level(double depth, double linear) {
   if (!(depth > 0.0)) return 0;
   int64_t w = 1;
@@ -88,9 +88,9 @@ class Cover {
         stop(stop),
         work(work),
         ask{obstacles, boxes, request.tolerance, request.clearance},
-        motion{chain,      links,     path,      (chain.nodes + LANES - 1) / LANES * LANES,
+        motion{chain,      links,       path,     (chain.nodes + LANES - 1) / LANES * LANES,
                work.nodes, work.bodies, work.rho, work.chord,
-               work.span,  work.fuzz, work.fit} {
+               work.span,  work.fuzz,   work.fit} {
     motion.begin(extents, request.bodies, request.body_count);
     work.leaves.clear();
     work.live.clear();
@@ -157,7 +157,8 @@ class Cover {
     }
     std::sort(work.leaves.begin(), work.leaves.end(), [](const Leaf& a, const Leaf& b) {
       if (a.segment != b.segment) return a.segment < b.segment;
-      return std::ldexp(double(a.start), -int(a.level)) < std::ldexp(double(b.start), -int(b.level));
+      return std::ldexp(double(a.start), -int(a.level)) <
+             std::ldexp(double(b.start), -int(b.level));
     });
   }
 
@@ -213,7 +214,7 @@ class Cover {
       Body& body = motion.stand(b, examined);
       int64_t from = static_cast<int64_t>(work.live.size());
       scan(motion.links, b, ask.boxes, request.clearance, body,
-           [&](int64_t o) { work.live.push_back({b, o, {0.0, 0.0, 0.0}, false}); });
+           [&](int64_t o) { work.live.push_back({b, o, {}, {}, {}, {}}); });
       if (work.proof.wanted) note_closed(piece, examined, b, from);
     }
   }
@@ -232,7 +233,7 @@ class Cover {
     for (int64_t i = task.first; i < task.last; i++) motion.need(work.live[i].body);
     motion.centre(task.piece);
     for (int64_t i = task.first; i < task.last; i++) {
-      Live live = work.live[i];
+      Live live = work.live[i].half(task.piece.numerator % 2 != 0);
       Body& body = motion.stand(live.body, examined);
       if (swept_clear(motion.links, live.body, ask.obstacles, live.obstacle, request.clearance,
                       body))
@@ -251,8 +252,8 @@ class Cover {
       Body& body = motion.bodies[b];
       if (body.error >= 0.0) continue;
       body.error = motion.fit_error(b);
-      double worth = body.nearest + WORTH * (motion.links.length(b, CORE) +
-                                             motion.links.length(b, BALL));
+      double worth =
+          body.nearest + WORTH * (motion.links.length(b, CORE) + motion.links.length(b, BALL));
       if (body.sweep > request.tolerance && !(body.error <= worth)) found = true;
     }
     return found;
@@ -268,8 +269,7 @@ class Cover {
       Live live = work.live[i];
       Body& body = motion.bodies[live.body];
       if (moving_clear(motion, live.body, ask.obstacles, live.obstacle, request.clearance, body)) {
-        work.proof.add(piece, examined,
-                       {BALLS_APART, 0, live.body, live.obstacle, {}, {}, 0.0});
+        work.proof.add(piece, examined, {BALLS_APART, 0, live.body, live.obstacle, {}, {}, 0.0});
         continue;
       }
       Outcome outcome =
@@ -290,10 +290,9 @@ class Cover {
         worst = known;
       }
       if (collides) break;
-      live.overlapped = known.upper < 0.0;
       work.live[kept] = live;
       // What overlaps at the centre is likely to overlap in a half: let it be tried first.
-      if (live.overlapped) std::swap(work.live[first], work.live[kept]);
+      if (known.upper < 0.0) std::swap(work.live[first], work.live[kept]);
       kept++;
     }
     if (status == UNDECIDED && kept > first) {

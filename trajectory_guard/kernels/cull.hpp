@@ -1,9 +1,9 @@
 // Close the pairs that a body's bounding sphere already keeps apart (trusted).
 //
-// Two inequalities, both against the obstacle's oriented box: the sphere at the piece's centre swept
-// by the largest displacement, and the sphere along the control points of its centre. The boxes
-// stand in a tree; a branch is left out if the sphere keeps clear of the bounds around all of its
-// obstacles, which is the same inequality for a larger box.
+// Two inequalities, both against the obstacle's oriented box: the sphere at the piece's centre
+// swept by the largest displacement, and the sphere along the control points of its centre. The
+// boxes stand in a tree; a branch is left out if the sphere keeps clear of the bounds around all
+// of its obstacles, which is the same inequality for a larger box.
 #pragma once
 
 #include "motion.hpp"
@@ -44,8 +44,9 @@ inline bool moving_clear(Motion& motion, int64_t b, const Solids& obstacles, int
                       ? farthest(motion.links.at(b, CENTRE), body.place, points)
                       : INFINITY;
   }
-  double needed = taken(motion.links, b, obstacles, o, clearance, body) + body.radius + body.error +
-                  chain_margin(motion.chain.depth[node], motion.nodes[node].growth.kappa, body.reach);
+  double needed =
+      taken(motion.links, b, obstacles, o, clearance, body) + body.radius + body.error +
+      chain_margin(motion.chain.depth[node], motion.nodes[node].growth.kappa, body.reach);
   return box_distance(body.place, obstacles, o) > needed * UP;
 }
 
@@ -53,8 +54,8 @@ inline bool moving_clear(Motion& motion, int64_t b, const Solids& obstacles, int
 template <class Open>
 inline void scan(const Solids& links, int64_t b, const Boxes& boxes, double clearance, Body& body,
                  Open open) {
-  double base = links.length(b, CORE) + links.length(b, BALL) + body.slack + clearance + body.sweep +
-                body.fuzz;
+  double base = links.length(b, CORE) + links.length(b, BALL) + body.slack + clearance +
+                body.sweep + body.fuzz;
   double whole = (base + sphere_margin(body.reach, boxes.far)) * UP;
   double square = whole * whole * UP;
   int64_t stack[64];
@@ -86,8 +87,8 @@ inline void scan(const Solids& links, int64_t b, const Boxes& boxes, double clea
       outside = outside > 0.0 ? outside : Lanes{};
       total += outside * outside;
     }
-    Lanes needed = (base + row(BOX_BALL) +
-                    SPHERE * UNIT_ROUNDOFF * (body.reach + row(BOX_FAR))) * UP;
+    Lanes needed =
+        (base + row(BOX_BALL) + SPHERE * UNIT_ROUNDOFF * (body.reach + row(BOX_FAR))) * UP;
     Mask clear = total > needed * needed * UP;
     const int64_t* obstacle = boxes.obstacle + branch[1] * LANES;
     for (int i = 0; i < LANES; i++)

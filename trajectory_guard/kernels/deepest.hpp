@@ -1,10 +1,10 @@
 // A point deep inside both solids at one instant (search), and how deep it is (trusted for G3).
 //
-// Maximise t subject to a.y + t <= d over the faces of both solids: the centre of the largest common
-// ball of two polytopes. Dual simplex on a 4x4 basis: start from an artificial tetrahedron, bring in
-// the most violated face, drop the one that keeps the multipliers positive. The optimum only falls,
-// so t <= 0 ends the search. The multipliers of the link's faces add up to the direction in which
-// the two are least entangled.
+// Maximise t subject to a.y + t <= d over the faces of both solids: the centre of the largest
+// common ball of two polytopes. Dual simplex on a 4x4 basis: start from an artificial tetrahedron,
+// bring in the most violated face, drop the one that keeps the multipliers positive. The optimum
+// only falls, so t <= 0 ends the search. The multipliers of the link's faces add up to the
+// direction in which the two are least entangled.
 #pragma once
 
 #include <vector>
@@ -42,7 +42,8 @@ inline double depth(const Faces& faces, const double* x) {
 }
 
 // The face that (x, t) violates most, if by more than `worst`, which is raised.
-inline bool most_violated(const Faces& faces, const double* x, double t, double& worst, int64_t& f) {
+inline bool most_violated(const Faces& faces, const double* x, double t, double& worst,
+                          int64_t& f) {
   Lanes most = all(-INFINITY);
   Mask where = {}, now = {0, 1, 2, 3, 4, 5, 6, 7};
   for (int64_t i = 0; i < faces.count; i += LANES, now += LANES) {
@@ -71,8 +72,7 @@ struct Common {
 
 // Propose a point deep inside a link and an obstacle at one pose; true if it is inside both.
 //
-// moved: scratch for the obstacle's faces in the node frame. enough: stop when a common ball of this
-// part of the best possible radius is found.
+// moved: scratch for the obstacle's faces in the node frame.
 inline bool deepest(const double* pose, const Solids& links, int64_t b, const Solids& obstacles,
                     int64_t o, std::vector<double>& moved, Common& out) {
   Faces mine = faces_of(links, b), world = faces_of(obstacles, o);
@@ -121,7 +121,8 @@ inline bool deepest(const double* pose, const Solids& links, int64_t b, const So
     int leave = -1;
     double ratio = INFINITY;
     for (int k = 0; k < 4; k++) {
-      shares[k] = a[0] * inverse[0][k] + a[1] * inverse[1][k] + a[2] * inverse[2][k] + inverse[3][k];
+      shares[k] =
+          a[0] * inverse[0][k] + a[1] * inverse[1][k] + a[2] * inverse[2][k] + inverse[3][k];
       if (shares[k] > 1e-12 && weight[k] / shares[k] < ratio) {
         ratio = weight[k] / shares[k];
         leave = k;

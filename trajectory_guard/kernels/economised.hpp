@@ -1,8 +1,9 @@
 // Polynomial motion of every node of a chain, economised after every joint (trusted).
 //
 // The space of affine displacements is linear, so weights may be 1: keep the pose of a node as a
-// polynomial of degree 5 in tau on [-1, 1] and push what is above degree 5 down after every product.
-// Building the rational curve costs degree 6 per joint; this costs the same for every joint.
+// polynomial of degree 5 in tau on [-1, 1] and push what is above degree 5 down after every
+// product. Building the rational curve costs degree 6 per joint; this costs the same for every
+// joint.
 //
 // **Economising** replaces c tau^k by c (tau^k - 2^(1-k) T_k), from the top down, an error of at
 // most |c| 2^(1-k).
@@ -35,7 +36,7 @@
 namespace guard {
 
 constexpr double LARGEST_ANGLE = 1.5;
-constexpr int CONTROLS = 13;   // control points: degree 5 raised to 12, which draws the hull tight
+constexpr int CONTROLS = 13;  // control points: degree 5 raised to 12, which draws the hull tight
 constexpr int CONTROL_ROW = 16;  // room for them in whole vectors; the last one is repeated
 constexpr double MAJORANT = 8.0;
 constexpr int POSE = 16;  // a pose by columns x, y, z, t of 4, the fourth entry unused
@@ -74,7 +75,9 @@ inline void economise(T* p) {
   p[0] += 0.03125 * p[6];
 }
 
-inline double absolute(double x) { return std::fabs(x); }
+inline double absolute(double x) {
+  return std::fabs(x);
+}
 
 // The error of dropping p[6] ... p[10].
 template <class T>
@@ -103,7 +106,9 @@ inline T series(const T* y, const double* a, T y_max, T y_error, T* h) {
   return error;
 }
 
-inline double root(double x) { return std::sqrt(x); }
+inline double root(double x) {
+  return std::sqrt(x);
+}
 
 // Cosine and sine of a turn as polynomials of degree 5; returns delta.
 //
@@ -143,8 +148,12 @@ struct Growth {
   double kappa;  // the largest majorant along the chain
 };
 
-inline Lanes twice_low(Lanes x) { return __builtin_shufflevector(x, x, 0, 1, 2, 3, 0, 1, 2, 3); }
-inline Lanes twice_high(Lanes x) { return __builtin_shufflevector(x, x, 4, 5, 6, 7, 4, 5, 6, 7); }
+inline Lanes twice_low(Lanes x) {
+  return __builtin_shufflevector(x, x, 0, 1, 2, 3, 0, 1, 2, 3);
+}
+inline Lanes twice_high(Lanes x) {
+  return __builtin_shufflevector(x, x, 4, 5, 6, 7, 4, 5, 6, 7);
+}
 inline Lanes pair(double low, double high) {
   return Lanes{low, low, low, low, high, high, high, high};
 }
@@ -251,7 +260,7 @@ const double (*bernstein())[CONTROL_ROW];
 
 // Write the control points of a polynomial pose; false if an entry is not finite and moderate.
 inline bool control_points(const Polynomial& q, Controls& points) {
-  const double(*basis)[CONTROL_ROW] = bernstein();
+  const double (*basis)[CONTROL_ROW] = bernstein();
   Lanes total = all(0.0);
   for (int c = 0; c < 4; c++)
     for (int r = 0; r < 3; r++) {

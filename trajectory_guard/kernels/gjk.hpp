@@ -15,10 +15,10 @@ constexpr int ROUNDS = 40;         // enough for the distance of two polytopes; 
 enum class Found { SEPARATED, OVERLAP, REACHED };
 
 struct Search {
-  double n[3];         // best direction, from the obstacle towards the link
-  double best;         // its support difference [m]
-  double distance;     // of the nearest points found [m]
-  double place[3];     // the obstacle's nearest point [m]
+  double n[3];      // best direction, from the obstacle towards the link
+  double best;      // its support difference [m]
+  double distance;  // of the nearest points found [m]
+  double place[3];  // the obstacle's nearest point [m]
 };
 
 // A difference of two support points, and the obstacle's one.
@@ -85,7 +85,8 @@ struct Standing {
     s.control = 0;
     for (int c = 0; c < 3; c++)
       s.gradient[c] = n[0] * pose[4 * c] + n[1] * pose[4 * c + 1] + n[2] * pose[4 * c + 2];
-    s.value = least_core(links, b, s.gradient) + n[0] * pose[12] + n[1] * pose[13] + n[2] * pose[14];
+    s.value =
+        least_core(links, b, s.gradient) + n[0] * pose[12] + n[1] * pose[13] + n[2] * pose[14];
     return s;
   }
 

@@ -29,7 +29,7 @@ static bool fill_basis() {
 
 static const bool FILLED = fill_basis();
 
-const double (*bernstein())[CONTROL_ROW] { return BASIS; }
+const double (*bernstein()) [CONTROL_ROW] { return BASIS; }
 
 // What a request is answered with; valid until the thread's next request.
 struct Answer {
@@ -57,8 +57,9 @@ int guard_cover(const Chain* chain, const Solids* links, const Solids* obstacles
   Work& work = room();
   Cover(*chain, *links, *obstacles, *boxes, *path, *extents, *request, stop, work).run();
   const Proof& proof = work.proof;
-  *answer = {int64_t(work.leaves.size()), int64_t(proof.entries.size()),
-             int64_t(proof.pieces.size()), work.pieces, work.leaves.data(), proof.entries.data(),
+  *answer = {int64_t(work.leaves.size()),  int64_t(proof.entries.size()),
+             int64_t(proof.pieces.size()), work.pieces,
+             work.leaves.data(),           proof.entries.data(),
              proof.pieces.data()};
   return 0;
 } catch (const std::bad_alloc&) {
@@ -73,9 +74,9 @@ int guard_link_motion(const Chain* chain, const Solids* links, const Path* path,
                       int64_t room_for, double* matrices, double* weights, double* lengths,
                       int64_t* count) try {
   Work work;
-  Motion motion{*chain,      *links,    *path,      (chain->nodes + LANES - 1) / LANES * LANES,
-                work.nodes,  work.bodies, work.rho, work.chord,
-                work.span,   work.fuzz, work.fit};
+  Motion motion{*chain,     *links,      *path,    (chain->nodes + LANES - 1) / LANES * LANES,
+                work.nodes, work.bodies, work.rho, work.chord,
+                work.span,  work.fuzz,   work.fit};
   motion.begin(*extents, &body, 1);
   motion.need_none();
   motion.need(body);
@@ -117,7 +118,8 @@ int guard_link_motion(const Chain* chain, const Solids* links, const Path* path,
 
 // Say which pairs (Q, 2) touch at the path's first instant.
 int guard_touching(const Chain* chain, const Solids* links, const Solids* obstacles,
-                   const Path* path, const int64_t* pairs, int64_t count, unsigned char* touch) try {
+                   const Path* path, const int64_t* pairs, int64_t count,
+                   unsigned char* touch) try {
   std::vector<double> poses(POSE * (chain->nodes + 1), 0.0);
   double* root = poses.data() + POSE * chain->nodes;
   root[0] = root[5] = root[10] = 1.0;

@@ -1,4 +1,5 @@
-// All link motions on one piece: poses at its centre, polynomials, control points, errors (trusted).
+// All link motions on one piece: poses at its centre, polynomials, control points, errors
+// (trusted).
 //
 // One value serves every pair of the piece; nothing is computed for links that no open pair needs.
 #pragma once
@@ -27,15 +28,15 @@ struct Node {
 
 // Lengths of a body on a piece [m].
 struct Body {
-  double reach;    // bound on its coordinates, the same for all pieces
-  double slack;    // what tracking adds, the same for all pieces
-  double sweep;    // largest displacement from the centre pose
-  double linear;   // the same without the chord's cap: linear in the piece's length
-  double fuzz;     // error of the centre pose
-  double place[3];  // sphere's centre at the piece's centre
-  double nearest;  // least distance of that place to a box
-  double error;    // of the built motion, without tracking and rounding; negative: not yet known
-  double radius;   // of the control points of the sphere's centre; negative: not yet known
+  double reach;       // bound on its coordinates, the same for all pieces
+  double slack;       // what tracking adds, the same for all pieces
+  double sweep;       // largest displacement from the centre pose
+  double linear;      // the same without the chord's cap: linear in the piece's length
+  double fuzz;        // error of the centre pose
+  double place[3];    // sphere's centre at the piece's centre
+  double nearest;     // least distance of that place to a box
+  double error;       // of the built motion, without tracking and rounding; negative: not yet known
+  double radius;      // of the control points of the sphere's centre; negative: not yet known
   int64_t stands_on;  // number of the piece that the columns above belong to
 };
 
@@ -145,9 +146,9 @@ struct Motion {
       if (!node.needed) continue;
       const Node* up = chain.parent[j] < 0 ? nullptr : &nodes[chain.parent[j]];
       double phi[TERMS] = {0.0, node.d[1], node.d[2], node.d[3], node.d[4], node.d[5]};
-      node.growth = extend(up ? &up->polynomial : nullptr, up ? &up->growth : nullptr,
-                           chain.kind[j], node.local, span[j], phi, node.cosine, node.sine,
-                           node.delta, node.polynomial);
+      node.growth =
+          extend(up ? &up->polynomial : nullptr, up ? &up->growth : nullptr, chain.kind[j],
+                 node.local, span[j], phi, node.cosine, node.sine, node.delta, node.polynomial);
       fit[j] = node.growth.fit;
     }
   }

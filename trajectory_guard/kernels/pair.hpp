@@ -2,7 +2,8 @@
 // point.
 //
 // Only three comparisons decide: `separation` above the limit and `turning` close the pair, and a
-// common point deeper than its motion proves an overlap. Everything else chooses what they are asked.
+// common point deeper than its motion proves an overlap. Everything else chooses what they are
+// asked.
 #pragma once
 
 #include "cull.hpp"
@@ -12,14 +13,28 @@
 
 namespace guard {
 
-constexpr int SWEPT_ROUNDS = 12;  // a direction for a whole piece comes soon, or it is too long
+constexpr int SWEPT_ROUNDS = 12;   // a direction for a whole piece comes soon, or it is too long
 constexpr double ACCURACY = 0.02;  // of the tolerance, for distances at the centre
 
-// A pair that is not closed yet, and what its last piece taught.
+// What was found at one instant: nothing yet, apart, or a point deep in both (node frame).
+struct Instant {
+  enum : int64_t { UNKNOWN, APART, DEEP } state;
+  double y[3];
+};
+
+// A pair that is not closed yet, and what its last piece taught: only hints for the search.
 struct Live {
   int64_t body, obstacle;
-  double n[3];      // the best direction so far, zero if there is none
-  bool overlapped;  // it overlapped at the centre of the piece above
+  double n[3];  // the best direction so far, zero if there is none
+  Instant start, centre, end;
+
+  // The same for a half of the piece.
+  Live half(bool second) const {
+    Live child = *this;
+    (second ? child.start : child.end) = centre;
+    child.centre.state = Instant::UNKNOWN;
+    return child;
+  }
 };
 
 enum class Outcome { CLOSED, OPEN, OVERLAPS };
@@ -45,6 +60,24 @@ inline double near_bound(const Search& found, const Node& node, double balls, do
     off[r] = found.place[r] + found.n[r] * found.distance - node.pose[12 + r];
   for (int c = 0; c < 3; c++) x[c] = dot(node.pose + 4 * c, off);
   return farthest(x, found.place, node.points) - balls + error;
+}
+
+// Keep a common point for the pieces to come, if it lies inside both.
+inline void remember(Instant& instant, const Common& found) {
+  if (!(found.mine > 0.0 && found.theirs > 0.0)) return;
+  instant.state = Instant::DEEP;
+  for (int r = 0; r < 3; r++) instant.y[r] = found.point[r];
+}
+
+// Try the plane that turns as the link does at the centre: m = omega x n.
+inline bool turns(const Node& node, const double* n, const Solids& links, int64_t b,
+                  const Solids& obstacles, int64_t o, const Doubt& doubt, double limit, double* m) {
+  double back[3];
+  for (int c = 0; c < 3; c++) back[c] = dot(node.pose + 4 * c, n);
+  const double* speed = node.polynomial.power[1];
+  for (int r = 0; r < 3; r++)
+    m[r] = speed[r] * back[0] + speed[4 + r] * back[1] + speed[8 + r] * back[2];
+  return turning(n, m, node.points, links, b, obstacles, o, doubt, limit);
 }
 
 // Try to close one pair on the piece.
@@ -81,43 +114,80 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
     return true;
   };
 
+  bool deep_start = live.start.state == Instant::DEEP, deep_end = live.end.state == Instant::DEEP;
+  auto moving = [&] {
+    return moving_witness(links, b, obstacles, o, node, doubt.error, margin, live.start.y,
+                          live.end.y, known);
+  };
+  if (node.sound && deep_start && deep_end && moving()) return Outcome::OVERLAPS;
+  bool maybe_free = node.sound && !deep_start && !deep_end;
   double n[3] = {live.n[0], live.n[1], live.n[2]};
   if (n[0] == 0.0 && n[1] == 0.0 && n[2] == 0.0) box_direction(body.place, obstacles, o, n);
   Search found;
-  if (node.sound && !live.overlapped) {
+  double m[3];
+  if (maybe_free) {
     // Most pairs are closed here, and most of them by the first direction.
     gjk(n, Moving{points}, links, b, obstacles, o, want, true, accuracy, SWEPT_ROUNDS, found);
     if (separates(found.n)) return Outcome::CLOSED;
     for (int r = 0; r < 3; r++) n[r] = found.n[r];
   }
-  Found state = gjk(n, Standing{node.pose}, links, b, obstacles, o, want, false, accuracy, ROUNDS,
-                    found);
-  known.upper = found.distance - balls + body.fuzz + margin;
-  for (int r = 0; r < 3; r++) known.place[r] = found.place[r];
-  if (node.sound && state != Found::OVERLAP) {
-    known.near = near_bound(found, node, balls, doubt.error + margin);
-    if (separates(found.n)) return Outcome::CLOSED;
-    // The plane that turns as the link does at the centre: m = omega x n.
-    double back[3], m[3];
-    for (int c = 0; c < 3; c++) back[c] = dot(node.pose + 4 * c, found.n);
-    const double* speed = node.polynomial.power[1];
-    for (int r = 0; r < 3; r++)
-      m[r] = speed[r] * back[0] + speed[4 + r] * back[1] + speed[8 + r] * back[2];
-    if (turning(found.n, m, points, links, b, obstacles, o, doubt, limit)) {
-      proof.add(piece, examined,
-                {PLANE_TURNING, 0, b, o, {found.n[0], found.n[1], found.n[2]},
-                 {m[0], m[1], m[2]}, 0.0});
-      return Outcome::CLOSED;
+  Common common{};
+  bool deep = false;
+  auto stands = [&] {
+    bool whole = standing_witness(links, b, obstacles, o, node, doubt.error, body.fuzz, margin,
+                                  scratch, common, known);
+    deep = known.depth > 0.0;
+    return whole;
+  };
+  // What was deep at an end may be so at the centre; then its distance is of no interest.
+  if ((deep_start || deep_end) && stands()) return Outcome::OVERLAPS;
+  if (!deep) {
+    Found state =
+        gjk(n, Standing{node.pose}, links, b, obstacles, o, want, false, accuracy, ROUNDS, found);
+    known.upper = found.distance - balls + body.fuzz + margin;
+    for (int r = 0; r < 3; r++) known.place[r] = found.place[r];
+    if (state != Found::OVERLAP) {
+      if (found.best - balls > limit) live.centre.state = Instant::APART;
+      if (node.sound) {
+        known.near = near_bound(found, node, balls, doubt.error + margin);
+        if (separates(found.n)) return Outcome::CLOSED;
+      }
+      if (maybe_free && turns(node, found.n, links, b, obstacles, o, doubt, limit, m)) {
+        proof.add(piece, examined,
+                  {PLANE_TURNING,
+                   0,
+                   b,
+                   o,
+                   {found.n[0], found.n[1], found.n[2]},
+                   {m[0], m[1], m[2]},
+                   0.0});
+        return Outcome::CLOSED;
+      }
     }
+    if (!(known.upper <= body.fuzz + margin)) return Outcome::OPEN;
+    if (!(deep_start || deep_end) && stands()) return Outcome::OVERLAPS;
   }
-  if (known.upper <= body.fuzz + margin) {
-    double direction[3];
-    if (overlaps(motion, b, obstacles, o, doubt.error, body.fuzz, margin, scratch, direction, known))
+  if (node.sound && deep) {
+    remember(live.centre, common);
+    // The ends are looked at only if both may be deep, too.
+    for (bool last : {false, true}) {
+      Instant& end = last ? live.end : live.start;
+      const Instant& other = last ? live.start : live.end;
+      if (end.state != Instant::UNKNOWN || other.state == Instant::APART) continue;
+      double pose[POSE];
+      Common at_end;
+      end_pose(points, last, pose);
+      end.state = Instant::APART;
+      if (deepest(pose, links, b, obstacles, o, scratch, at_end)) remember(end, at_end);
+    }
+    if (!(deep_start && deep_end) && live.start.state == Instant::DEEP &&
+        live.end.state == Instant::DEEP && moving())
       return Outcome::OVERLAPS;
-    if (node.sound && (direction[0] != 0.0 || direction[1] != 0.0 || direction[2] != 0.0))
-      keep(live, direction,
-           separation(direction, points, links, b, obstacles, o, doubt, limit), known);
   }
+  const double* direction = common.direction;
+  if (node.sound && (direction[0] != 0.0 || direction[1] != 0.0 || direction[2] != 0.0))
+    keep(live, direction, separation(direction, points, links, b, obstacles, o, doubt, limit),
+         known);
   return Outcome::OPEN;
 }
 

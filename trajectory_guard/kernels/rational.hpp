@@ -2,11 +2,11 @@
 //
 // With u = tan(angle / 2) a rotation about z is (1 / (1 + u^2)) [[1-u^2, -2u], [2u, 1-u^2]]: a
 // rational curve. A chain of such rotations, constant rigid transforms and polynomial slides is a
-// rational Bezier curve in the 12-dimensional space of affine displacements [Schroecker & Weber 2014,
-// sec. 6] of degree 6 per moving revolute joint and 3 per moving prismatic one. All factors are kept
-// in the *scaled* Bernstein basis b_i C(n, i), in which a product is a plain convolution and the
-// binomials cancel in C_i / w_i. If every weight is positive the link's point x lies, at every
-// instant of the piece, in the convex hull of the points C_i x / w_i.
+// rational Bezier curve in the 12-dimensional space of affine displacements [Schroecker & Weber
+// 2014, sec. 6] of degree 6 per moving revolute joint and 3 per moving prismatic one. All factors
+// are kept in the *scaled* Bernstein basis b_i C(n, i), in which a product is a plain convolution
+// and the binomials cancel in C_i / w_i. If every weight is positive the link's point x lies, at
+// every instant of the piece, in the convex hull of the points C_i x / w_i.
 //
 // **Half-angle.** With x = phi / 2 and X = sum_{i>=1} |d_i| / 2 < 1 the rational rotation with
 // u(tau) ~ tan(x) has the angle 2 atan(u), and because atan is 1-Lipschitz
@@ -15,9 +15,9 @@
 //     |r| <= (2/15) X^5 / (1 - 0.41 X^2).
 //
 // The Taylor coefficients of tan beyond x^3/3 are positive and their ratios increase to 4/pi^2 <
-// 0.41, which gives r. The polynomial x + x^3/3 is economised to degree 3 from the top down: tau^k is
-// replaced by tau^k - 2^(1-k) T_k(tau), an error of at most 2^(1-k) times its coefficient. The fit's
-// own rounding is below 64 u X.
+// 0.41, which gives r. The polynomial x + x^3/3 is economised to degree 3 from the top down: tau^k
+// is replaced by tau^k - 2^(1-k) T_k(tau), an error of at most 2^(1-k) times its coefficient. The
+// fit's own rounding is below 64 u X.
 #pragma once
 
 #include <vector>
@@ -26,10 +26,11 @@
 
 namespace guard {
 
-constexpr int FIT = 3;                        // degree of u
-constexpr int POWERS = 3 * (TERMS - 1) + 1;   // coefficients of x^3
-constexpr double LARGEST_HALF_ANGLE = 0.9;    // beyond it the joint is frozen, its turn all error
-constexpr double SLIDE_GROWTH = 2.0;  // bounds 25/16: a cubic's Bernstein coefficients over its size
+constexpr int FIT = 3;                       // degree of u
+constexpr int POWERS = 3 * (TERMS - 1) + 1;  // coefficients of x^3
+constexpr double LARGEST_HALF_ANGLE = 0.9;   // beyond it the joint is frozen, its turn all error
+constexpr double SLIDE_GROWTH =
+    2.0;  // bounds 25/16: a cubic's Bernstein coefficients over its size
 // A weight much smaller than its columns would carry a relative error that no margin counts.
 constexpr double LARGEST_RATIO = 4.0;
 constexpr int ROW = 13;  // a control matrix, rows of [C | t], and its weight
@@ -147,7 +148,8 @@ inline RationalLink rational_link(const Motion& motion, int64_t b) {
       double* to = &placed[i * ROW];
       for (int r = 0; r < 3; r++) {
         for (int c = 0; c < 4; c++)
-          to[4 * r + c] = from[4 * r] * node.local[4 * c] + from[4 * r + 1] * node.local[4 * c + 1] +
+          to[4 * r + c] = from[4 * r] * node.local[4 * c] +
+                          from[4 * r + 1] * node.local[4 * c + 1] +
                           from[4 * r + 2] * node.local[4 * c + 2];
         to[4 * r + 3] += from[4 * r + 3];
       }

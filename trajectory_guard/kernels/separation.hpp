@@ -158,9 +158,8 @@ inline bool turning(const double* n, const double* m, const Controls& points, co
   double square = square_start > square_end ? square_start : square_end;
   // Between a tenth and twice a unit vector `allowance` covers the rounding, taken twice.
   if (!(square < 4.0 && square > 0.01)) return false;
-  double need =
-      std::sqrt(square) * (distance + allowance(links, b, obstacles, o, doubt)) * UP +
-      2.0 * plane_margin(doubt.kappa, doubt.reach, obstacles.length(o, FAR));
+  double need = std::sqrt(square) * (distance + allowance(links, b, obstacles, o, doubt)) * UP +
+                2.0 * plane_margin(doubt.kappa, doubt.reach, obstacles.length(o, FAR));
   double high_start = highest(obstacles, o, start), high_end = highest(obstacles, o, end);
   Gradients at_start, at_end, g;
   gradients(points, start, at_start);

@@ -18,11 +18,17 @@ inline Lanes load(const double* p) {
   return x;
 }
 
-inline void store(double* p, Lanes x) { std::memcpy(p, &x, sizeof x); }
+inline void store(double* p, Lanes x) {
+  std::memcpy(p, &x, sizeof x);
+}
 
-inline Lanes all(double x) { return Lanes{x, x, x, x, x, x, x, x}; }
+inline Lanes all(double x) {
+  return Lanes{x, x, x, x, x, x, x, x};
+}
 
-inline Lanes absolute(Lanes x) { return x < 0.0 ? -x : x; }
+inline Lanes absolute(Lanes x) {
+  return x < 0.0 ? -x : x;
+}
 
 inline Lanes root(Lanes x) {
   for (int i = 0; i < LANES; i++) x[i] = std::sqrt(x[i]);

@@ -1,7 +1,6 @@
 """The node `guard`: certifies trajectories on request."""
 
 from collections.abc import Callable, Sequence
-import dataclasses
 import os
 import signal
 import sys
@@ -22,6 +21,7 @@ from std_msgs.msg import String
 from trajectory_guard_interfaces.srv import CertifyTrajectory
 
 from msg_adapters.result import result_to_message, ros_message_types
+from trajectory_guard.certificate import text
 from trajectory_guard.certify import judge
 from trajectory_guard.errors import Reason, RequestError, TrajectoryGuardError
 from trajectory_guard.result import Result
@@ -35,7 +35,6 @@ from trajectory_guard.warm import warm_up
 from trajectory_guard.workcell import Workcell
 
 NAME = 'guard'
-NO_CERTIFICATE = 'certificates are not available in this version'
 
 # Requests that arrive faster than they are taken wait here; the middleware drops older ones.
 REQUESTS = QoSProfile(depth=256)
@@ -172,7 +171,10 @@ class Guard(Node):
         self, request: CertifyTrajectory.Request, response: CertifyTrajectory.Response
     ) -> CertifyTrajectory.Response:
         try:
-            response.result = result_to_message(self._answer(request), self._types)
+            result = self._answer(request)
+            response.result = result_to_message(result, self._types)
+            if result.certificate is not None:
+                response.certificate = text(result.certificate)
         except Exception as error:  # fail closed: an error here would end the node
             self.get_logger().error(f'a request failed: {error!r}')
             internal = TrajectoryGuardError(Reason.INTERNAL_ERROR, f'internal error: {error!r}')
@@ -188,8 +190,6 @@ class Guard(Node):
                 result = judge(model, *question_from_request(request, configuration))
             except TrajectoryGuardError as error:
                 result = Result.rejected(error, configuration.settings)
-        if request.want_certificate:
-            result = dataclasses.replace(result, warnings=(*result.warnings, NO_CERTIFICATE))
         self.get_logger().debug(
             f'{result.verdict.name.lower()} {result.reason_code} in {result.compute_time:.6f} s'
         )

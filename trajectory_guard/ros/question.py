@@ -95,6 +95,7 @@ def _settings(request: Any, joint_names: Sequence[str], configuration: Configura
             request.tracking_tolerance, least.tracking_tolerance
         ),
         deadline_ns=nanoseconds_from_message(request.deadline) or least.deadline_ns,
+        want_certificate=bool(request.want_certificate),
     )
     # Settings have refused what is negative or NaN by now.
     if asked.clearance < least.clearance:
