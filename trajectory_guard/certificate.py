@@ -109,26 +109,23 @@ def _apart(entries: np.ndarray) -> dict:
     """Return the entries that keep pairs apart, by kind."""
     balls = []
     some = entries[entries['kind'] == layout.BALLS_APART]
-    rows = sorted(zip(*(some[name].tolist() for name in ('piece', 'body', 'obstacle'))))
+    columns = [some[name].tolist() for name in ('piece', 'body', 'obstacle')]
+    rows = sorted(zip(*columns, strict=True))
     for (piece, body), group in groupby(rows, key=lambda row: row[:2]):
         balls.append([piece, body, [obstacle for _, _, obstacle in group]])
-    between = entries[entries['kind'] == layout.PLANE_BETWEEN]
-    turning = entries[entries['kind'] == layout.PLANE_TURNING]
     return {
         'balls': balls,
-        'planes': [
-            [piece, body, obstacle, *n, offset]
-            for _, piece, body, obstacle, n, _, offset in _rows(between)
-        ],
-        'turning': [
-            [piece, body, obstacle, *n, *m] for _, piece, body, obstacle, n, m, _ in _rows(turning)
-        ],
+        'planes': _rows(entries, layout.PLANE_BETWEEN, ('n', 'offset')),
+        'turning': _rows(entries, layout.PLANE_TURNING, ('n', 'm', 'k')),
     }
 
 
-def _rows(entries: np.ndarray) -> list[tuple]:
-    """Return entries as tuples of plain numbers."""
-    return [tuple(v.tolist() if isinstance(v, np.ndarray) else v for v in e.tolist()) for e in entries]
+def _rows(entries: np.ndarray, kind: int, numbers: tuple[str, ...]) -> list[list]:
+    """Return the entries of a kind: piece, body, obstacle, and some of their numbers."""
+    some = entries[entries['kind'] == kind]
+    pairs = np.column_stack([some[name] for name in ('piece', 'body', 'obstacle')]).tolist()
+    values = np.column_stack([some[name] for name in numbers]).tolist()
+    return [pair + value for pair, value in zip(pairs, values, strict=True)]
 
 
 def _collisions(workcell: Workcell, leaves: np.ndarray, pieces: list) -> list[list]:

@@ -26,6 +26,11 @@ namespace guard {
 constexpr int64_t DEEPEST_LEVEL = 48;  // times are exact dyadic numbers in a double up to here
 constexpr int64_t FINEST_WITNESS = 12;
 
+// A piece with more open pairs than this is halved before they are opened, while some body sweeps
+// more than this part of its own size.
+constexpr int64_t CROWD = 256;
+constexpr double WIDE = 0.25;
+
 // How much of the motion is asked about; the values of `settings.Scope`.
 enum : int64_t { SCOPE_ALL, SCOPE_FIRST, SCOPE_VERDICT };
 
@@ -38,11 +43,15 @@ struct Request {
   int64_t body_count;
 };
 
-// Say whether halving a piece would only cut finer what lies within the tolerance.
+// What stays within this part of the tolerance during a whole piece is not cut any finer; a gap
+// between it and the tolerance is cheap to prove free and would be given away.
+constexpr double CLOSE = 1.0 / 16.0;
+
+// Say whether halving a piece would only cut finer what lies within the tolerance anyway.
 inline bool settled(const Known& known, double limit, double sweep, double tolerance) {
+  double close = CLOSE * tolerance;
   return known.upper <= limit + tolerance &&
-         (known.lower >= limit - tolerance || known.near <= limit + tolerance ||
-          sweep <= tolerance);
+         (known.lower >= limit - close || known.near <= limit + close || sweep <= tolerance);
 }
 
 // Return w such that the middle 2^-w of a piece provably collides, 0 if none is known.
@@ -71,7 +80,8 @@ struct Work {
   int64_t pieces = 0;
 };
 
-// A piece to examine and its open pairs; a segment's own piece has all pairs and no list.
+// A piece to examine and its open pairs; a segment's own piece has all pairs and no list, and so
+// have the halves of a crowded one.
 struct Task {
   Piece piece;
   int64_t first, last;
@@ -113,6 +123,7 @@ class Cover {
   Question ask;
   Motion motion;
   int64_t given_up = -1;
+  bool crowded = false;  // the last piece had too many pairs to open
 
   void depth_first() {
     std::vector<Task> stack;
@@ -125,10 +136,8 @@ class Cover {
         // What lies behind this task's pairs belongs to pieces that are done.
         work.live.resize(task.last);
         if (look(task)) {
-          int64_t last = static_cast<int64_t>(work.live.size());
-          const Piece& p = task.piece;
-          stack.push_back({{p.segment, 2 * p.numerator + 1, p.level + 1}, task.last, last, false});
-          stack.push_back({{p.segment, 2 * p.numerator, p.level + 1}, task.last, last, false});
+          stack.push_back(half(task, true, task.last));
+          stack.push_back(half(task, false, task.last));
         } else if (request.scope == SCOPE_FIRST && work.leaves.back().status != FREE) {
           return;
         }
@@ -146,10 +155,8 @@ class Cover {
       if (spent(task.piece)) continue;
       int64_t first = static_cast<int64_t>(work.live.size());
       if (look(task)) {
-        int64_t last = static_cast<int64_t>(work.live.size());
-        const Piece& p = task.piece;
-        queue.push_back({{p.segment, 2 * p.numerator, p.level + 1}, first, last, false});
-        queue.push_back({{p.segment, 2 * p.numerator + 1, p.level + 1}, first, last, false});
+        queue.push_back(half(task, false, first));
+        queue.push_back(half(task, true, first));
       } else {
         work.live.resize(first);
         if (work.leaves.back().status != FREE) given_up = BY_SCOPE;
@@ -160,6 +167,13 @@ class Cover {
       return std::ldexp(double(a.start), -int(a.level)) <
              std::ldexp(double(b.start), -int(b.level));
     });
+  }
+
+  // A half of a piece, with the pairs that stayed open from `first` on; all pairs if it was crowded.
+  Task half(const Task& task, bool second, int64_t first) const {
+    const Piece& p = task.piece;
+    Piece piece{p.segment, 2 * p.numerator + second, p.level + 1};
+    return {piece, first, int64_t(work.live.size()), crowded};
   }
 
   // Write a leaf for a piece that nobody will look at any more.
@@ -186,9 +200,9 @@ class Cover {
     const Piece& piece = task.piece;
     int64_t examined = ++work.pieces;
     int64_t first = static_cast<int64_t>(work.live.size());
-    if (task.whole)
-      open_all(piece, examined);
-    else
+    crowded = task.whole && !open_all(piece, examined);
+    if (crowded) return true;
+    if (!task.whole)
       open_some(task, examined);
     int64_t last = static_cast<int64_t>(work.live.size());
     Known worst{};
@@ -204,27 +218,41 @@ class Cover {
     return !try_pairs(piece, examined, first, deep);
   }
 
-  // Open the pairs of a whole segment that the swept spheres do not close.
-  void open_all(const Piece& piece, int64_t examined) {
+  // Open the pairs that the swept spheres do not close; false, and none is open, if they are many
+  // and fewer would be in each half.
+  bool open_all(const Piece& piece, int64_t examined) {
     motion.need_none();
     for (int64_t i = 0; i < request.body_count; i++) motion.need(request.bodies[i]);
     motion.centre(piece);
+    int64_t first = static_cast<int64_t>(work.live.size());
+    bool wide = false;
     for (int64_t i = 0; i < request.body_count; i++) {
       int64_t b = request.bodies[i];
       Body& body = motion.stand(b, examined);
-      int64_t from = static_cast<int64_t>(work.live.size());
-      scan(motion.links, b, ask.boxes, request.clearance, body,
-           [&](int64_t o) { work.live.push_back({b, o, {}, {}, {}, {}}); });
-      if (work.proof.wanted) note_closed(piece, examined, b, from);
+      scan(motion.links, b, ask.boxes, request.clearance, body, [&](int64_t o) {
+        work.live.push_back({b, o, {}, {}, {}, {}});
+      });
+      wide = wide || body.sweep > WIDE * (motion.links.length(b, CORE) + motion.links.length(b, BALL));
+      if (wide && int64_t(work.live.size()) - first > CROWD && piece.level < DEEPEST_LEVEL) {
+        work.live.resize(first);
+        return false;
+      }
     }
+    if (work.proof.wanted) note_closed(piece, examined, first);
+    return true;
   }
 
-  // Write proof entries for the obstacles that a scan closed.
-  void note_closed(const Piece& piece, int64_t examined, int64_t b, int64_t from) {
-    std::vector<char> open(ask.obstacles.count, 0);
-    for (size_t i = from; i < work.live.size(); i++) open[work.live[i].obstacle] = 1;
-    for (int64_t o = 0; o < ask.obstacles.count; o++)
-      if (!open[o]) work.proof.add(piece, examined, {BALLS_APART, 0, b, o, {}, {}, 0.0});
+  // Write proof entries for the pairs that a scan closed.
+  void note_closed(const Piece& piece, int64_t examined, int64_t first) {
+    std::vector<char> open(ask.obstacles.count);
+    size_t i = first;
+    for (int64_t k = 0; k < request.body_count; k++) {
+      int64_t b = request.bodies[k];
+      std::fill(open.begin(), open.end(), 0);
+      for (; i < work.live.size() && work.live[i].body == b; i++) open[work.live[i].obstacle] = 1;
+      for (int64_t o = 0; o < ask.obstacles.count; o++)
+        if (!open[o]) work.proof.add(piece, examined, {BALLS_APART, 0, b, o, {}, 0.0});
+    }
   }
 
   // Copy the pairs that the swept spheres do not close behind all others.
@@ -238,7 +266,7 @@ class Cover {
       if (swept_clear(motion.links, live.body, ask.obstacles, live.obstacle, request.clearance,
                       body))
         work.proof.add(task.piece, examined,
-                       {BALLS_APART, 0, live.body, live.obstacle, {}, {}, 0.0});
+                       {BALLS_APART, 0, live.body, live.obstacle, {}, 0.0});
       else
         work.live.push_back(live);
     }
@@ -269,7 +297,7 @@ class Cover {
       Live live = work.live[i];
       Body& body = motion.bodies[live.body];
       if (moving_clear(motion, live.body, ask.obstacles, live.obstacle, request.clearance, body)) {
-        work.proof.add(piece, examined, {BALLS_APART, 0, live.body, live.obstacle, {}, {}, 0.0});
+        work.proof.add(piece, examined, {BALLS_APART, 0, live.body, live.obstacle, {}, 0.0});
         continue;
       }
       Outcome outcome =

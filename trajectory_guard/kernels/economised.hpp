@@ -255,20 +255,42 @@ struct Controls {
   alignas(64) double entry[12][CONTROL_ROW];
 };
 
+inline double binomial(int n, int k) {
+  double c = k < 0 || k > n ? 0.0 : 1.0;
+  for (int i = 0; i < k && c > 0.0; i++) c = c * (n - i) / (i + 1);
+  return c;
+}
+
 // The Bernstein coefficients of tau^k, tau = 2 s - 1, at degree 12, by rows of k.
-const double (*bernstein())[CONTROL_ROW];
+struct Basis {
+  double row[TERMS][CONTROL_ROW];
+
+  // tau^k 1^(n-k) = (s - v)^k (s + v)^(n-k) with v = 1 - s, exact in integers, over the binomials.
+  Basis() {
+    constexpr int n = CONTROLS - 1;
+    for (int k = 0; k < TERMS; k++) {
+      double c[CONTROLS] = {1.0};
+      for (int step = 0; step < n; step++)
+        for (int i = step + 1; i >= 0; i--)
+          c[i] = (i > 0 ? c[i - 1] : 0.0) + (step < k ? -1.0 : 1.0) * (i <= step ? c[i] : 0.0);
+      for (int i = 0; i < CONTROL_ROW; i++)
+        row[k][i] = i <= n ? c[i] / binomial(n, i) : row[k][n];
+    }
+  }
+};
+
+inline const Basis BASIS;
 
 // Write the control points of a polynomial pose; false if an entry is not finite and moderate.
 inline bool control_points(const Polynomial& q, Controls& points) {
-  const double (*basis)[CONTROL_ROW] = bernstein();
   Lanes total = all(0.0);
   for (int c = 0; c < 4; c++)
     for (int r = 0; r < 3; r++) {
       int e = 4 * c + r;
       Lanes low = all(q.power[0][e]), high = low;
       for (int k = 1; k < TERMS; k++) {
-        low += q.power[k][e] * load(basis[k]);
-        high += q.power[k][e] * load(basis[k] + LANES);
+        low += q.power[k][e] * load(BASIS.row[k]);
+        high += q.power[k][e] * load(BASIS.row[k] + LANES);
       }
       store(points.entry[3 * c + r], low);
       store(points.entry[3 * c + r] + LANES, high);

@@ -7,30 +7,6 @@
 
 namespace guard {
 
-static double BASIS[TERMS][CONTROL_ROW];
-
-// tau^k 1^(n-k) = (s - v)^k (s + v)^(n-k) with v = 1 - s, exact in integers, over the binomials.
-static bool fill_basis() {
-  const int n = CONTROLS - 1;
-  for (int k = 0; k < TERMS; k++) {
-    double c[CONTROLS + 1] = {1.0};
-    for (int step = 0; step < n; step++)
-      for (int i = step + 1; i >= 0; i--)
-        c[i] = (i > 0 ? c[i - 1] : 0.0) + (step < k ? -1.0 : 1.0) * (i <= step ? c[i] : 0.0);
-    double binomial = 1.0;
-    for (int i = 0; i <= n; i++) {
-      BASIS[k][i] = c[i] / binomial;
-      binomial = binomial * (n - i) / (i + 1);
-    }
-    for (int i = n + 1; i < CONTROL_ROW; i++) BASIS[k][i] = BASIS[k][n];
-  }
-  return true;
-}
-
-static const bool FILLED = fill_basis();
-
-const double (*bernstein()) [CONTROL_ROW] { return BASIS; }
-
 // What a request is answered with; valid until the thread's next request.
 struct Answer {
   int64_t leaf_count, entry_count, piece_count, pieces;

@@ -43,7 +43,7 @@ LEAF = np.dtype(
 PIECE = np.dtype([('segment', np.int64), ('numerator', np.int64), ('level', np.int64)])
 ENTRY = np.dtype(
     [(name, np.int64) for name in ('kind', 'piece', 'body', 'obstacle')]
-    + [('n', float, 3), ('m', float, 3), ('offset', float)]
+    + [('n', float, 3), ('m', float, 3), ('k', float, 3), ('offset', float)]
 )
 
 

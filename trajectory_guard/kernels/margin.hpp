@@ -47,8 +47,8 @@
 //
 //     PLANE * u * (kappa * reach + |obstacle|),        PLANE = 64.
 //
-// A turning plane n(tau) = n + tau m has |n +- m| <= 2, two such terms and a mean of two: the same
-// with PLANE doubled.
+// A turning plane has directions of length up to 2 and means of three such terms with weights that
+// add up to 1: less than twice the same, once more in its allowance.
 //
 // **Sphere against box** (`cull`). A point is brought into the box's frame by 3 dot products and
 // its distance formed by 3 squares and a root, 18 roundings on numbers up to twice the

@@ -69,15 +69,17 @@ inline void remember(Instant& instant, const Common& found) {
   for (int r = 0; r < 3; r++) instant.y[r] = found.point[r];
 }
 
-// Try the plane that turns as the link does at the centre: m = omega x n.
-inline bool turns(const Node& node, const double* n, const Solids& links, int64_t b,
-                  const Solids& obstacles, int64_t o, const Doubt& doubt, double limit, double* m) {
+// The plane that turns as the link does about the centre: n(tau) = R(tau) R(0)^T n to second order.
+inline Turn with_link(const Node& node, const double* n) {
+  Turn turn{{n[0], n[1], n[2]}, {}, {}};
   double back[3];
   for (int c = 0; c < 3; c++) back[c] = dot(node.pose + 4 * c, n);
-  const double* speed = node.polynomial.power[1];
   for (int r = 0; r < 3; r++)
-    m[r] = speed[r] * back[0] + speed[4 + r] * back[1] + speed[8 + r] * back[2];
-  return turning(n, m, node.points, links, b, obstacles, o, doubt, limit);
+    for (int c = 0; c < 3; c++) {
+      turn.m[r] += node.polynomial.power[1][4 * c + r] * back[c];
+      turn.k[r] += node.polynomial.power[2][4 * c + r] * back[c];
+    }
+  return turn;
 }
 
 // Try to close one pair on the piece.
@@ -106,7 +108,7 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
     keep(live, n, lower, known);
     if (!(known.lower > limit)) return false;
     if (proof.wanted) {
-      Entry entry{PLANE_BETWEEN, 0, b, o, {live.n[0], live.n[1], live.n[2]}, {}, 0.0};
+      Entry entry{PLANE_BETWEEN, 0, b, o, {{live.n[0], live.n[1], live.n[2]}, {}, {}}, 0.0};
       entry.offset = highest(obstacles, o, live.n) + obstacles.length(o, BALL) + ask.clearance +
                      0.5 * (known.lower - limit);
       proof.add(piece, examined, entry);
@@ -124,7 +126,6 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
   double n[3] = {live.n[0], live.n[1], live.n[2]};
   if (n[0] == 0.0 && n[1] == 0.0 && n[2] == 0.0) box_direction(body.place, obstacles, o, n);
   Search found;
-  double m[3];
   if (maybe_free) {
     // Most pairs are closed here, and most of them by the first direction.
     gjk(n, Moving{points}, links, b, obstacles, o, want, true, accuracy, SWEPT_ROUNDS, found);
@@ -152,15 +153,9 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
         known.near = near_bound(found, node, balls, doubt.error + margin);
         if (separates(found.n)) return Outcome::CLOSED;
       }
-      if (maybe_free && turns(node, found.n, links, b, obstacles, o, doubt, limit, m)) {
-        proof.add(piece, examined,
-                  {PLANE_TURNING,
-                   0,
-                   b,
-                   o,
-                   {found.n[0], found.n[1], found.n[2]},
-                   {m[0], m[1], m[2]},
-                   0.0});
+      Turn turn = with_link(node, found.n);
+      if (maybe_free && turning(turn, points, links, b, obstacles, o, doubt, limit)) {
+        proof.add(piece, examined, {PLANE_TURNING, 0, b, o, turn, 0.0});
         return Outcome::CLOSED;
       }
     }

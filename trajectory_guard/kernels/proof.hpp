@@ -4,16 +4,19 @@
 #include <vector>
 
 #include "piece.hpp"
+#include "separation.hpp"
 
 namespace guard {
 
 // Kinds of entries.
 enum : int64_t { BALLS_APART, PLANE_BETWEEN, PLANE_TURNING };
 
-// The pair is apart on the piece; n and m as in `separation`, the plane n.x = offset.
+// The pair is apart on the piece; the direction of the plane as in `separation`, and its offset if it
+// stands: n.x = offset.
 struct Entry {
   int64_t kind, piece, body, obstacle;
-  double n[3], m[3], offset;
+  Turn turn;
+  double offset;
 };
 
 // Entries and the pieces they speak of; nothing is kept if nobody asked.

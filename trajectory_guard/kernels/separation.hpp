@@ -12,11 +12,15 @@
 // and axis a adds -R |g - (g.a) a| with g = P_i^T n, its exact support. The direction may come from
 // anywhere; only this number decides.
 //
-// **Turning plane.** n(tau) = n + tau m. The product with P(tau) has degree 13 and the control
-// values f_k(v) = (1 - k/13) (n - m).(P_k v) + (k/13) (n + m).(P_{k-1} v), each affine in v; the
-// obstacle's support is convex in tau, so it stays below the chord h_k = (1 - k/13) h_0 + (k/13)
-// h_13 of its values at both ends. With N = max |n +- m| >= |n(tau)|, the pair keeps the distance L
-// during the whole piece if f_k(v) - h_k >= N (L + e + r + r') + rounding for all k and v.
+// **Turning plane.** n(tau) = n + tau m + tau^2 k has the Bernstein vectors N_0 = n - m + k, N_1 =
+// n - k, N_2 = n + m + k. The product with P(tau) has degree 14 and the control values
+//
+//     f_i(v) = sum_j a_ij N_j.(P_{i-j} v),        a_ij = C(12, i-j) C(2, j) / C(14, i),
+//
+// each affine in v; the obstacle's support is convex in n, so it stays below the polynomial with the
+// Bernstein values max_p N_j.p, which degree 14 turns into sum_j a_ij max_p N_j.p. With N = max |N_j|
+// >= |n(tau)|, the pair keeps the distance L during the whole piece if every f_i(v) minus that exceeds
+// N (L + e + r + r') + rounding. A disc is bounded alike, as its support is convex in n, too.
 #pragma once
 
 #include <cmath>
@@ -144,36 +148,59 @@ inline double separation(const double* n, const Controls& points, const Solids& 
   return gap < INFINITY ? gap : -INFINITY;
 }
 
-// Say whether the plane that turns as n + tau m proves that a pair keeps a distance [m].
-inline bool turning(const double* n, const double* m, const Controls& points, const Solids& links,
-                    int64_t b, const Solids& obstacles, int64_t o, const Doubt& doubt,
-                    double distance) {
-  double start[3], end[3], square_start = 0.0, square_end = 0.0;
-  for (int r = 0; r < 3; r++) {
-    start[r] = n[r] - m[r];
-    end[r] = n[r] + m[r];
-    square_start += start[r] * start[r];
-    square_end += end[r] * end[r];
+// A direction that turns with the piece: n + tau m + tau^2 k.
+struct Turn {
+  double n[3], m[3], k[3];
+};
+
+constexpr int TURN = 2;  // its degree
+
+// The shares a_ij.
+struct Shares {
+  double row[CONTROLS + TURN][TURN + 1];
+
+  Shares() {
+    constexpr int n = CONTROLS - 1;
+    for (int i = 0; i <= n + TURN; i++)
+      for (int j = 0; j <= TURN; j++)
+        row[i][j] = binomial(n, i - j) * binomial(TURN, j) / binomial(n + TURN, i);
   }
-  double square = square_start > square_end ? square_start : square_end;
-  // Between a tenth and twice a unit vector `allowance` covers the rounding, taken twice.
-  if (!(square < 4.0 && square > 0.01)) return false;
+};
+
+inline const Shares SHARES;
+
+// Say whether a plane that turns proves that a pair keeps a distance [m].
+inline bool turning(const Turn& turn, const Controls& points, const Solids& links, int64_t b,
+                    const Solids& obstacles, int64_t o, const Doubt& doubt, double distance) {
+  double direction[TURN + 1][3], high[TURN + 1], square = 0.0;
+  Gradients part[TURN + 1], g;
+  for (int r = 0; r < 3; r++) {
+    direction[0][r] = turn.n[r] - turn.m[r] + turn.k[r];
+    direction[1][r] = turn.n[r] - turn.k[r];
+    direction[2][r] = turn.n[r] + turn.m[r] + turn.k[r];
+  }
+  for (int j = 0; j <= TURN; j++) {
+    const double* n = direction[j];
+    double own = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+    // Up to twice a unit vector `allowance` covers the rounding, taken twice.
+    if (!(own < 4.0 && own > 0.01)) return false;
+    if (own > square) square = own;
+    high[j] = highest(obstacles, o, n);
+    gradients(points, n, part[j]);
+  }
   double need = std::sqrt(square) * (distance + allowance(links, b, obstacles, o, doubt)) * UP +
                 2.0 * plane_margin(doubt.kappa, doubt.reach, obstacles.length(o, FAR));
-  double high_start = highest(obstacles, o, start), high_end = highest(obstacles, o, end);
-  Gradients at_start, at_end, g;
-  gradients(points, start, at_start);
-  gradients(points, end, at_end);
-  for (int k = 0; k <= CONTROLS; k++) {
-    double late = k / double(CONTROLS), early = 1.0 - late;
-    for (int c = 0; c < 4; c++)
-      g.row[c][k] = (k < CONTROLS ? early * at_start.row[c][k] : 0.0) +
-                    (k > 0 ? late * at_end.row[c][k - 1] : 0.0);
-    g.row[3][k] -= early * high_start + late * high_end;
+  g.count = CONTROLS + TURN;
+  for (int i = 0; i < CONTROL_ROW; i++) {
+    int from = i < g.count ? i : g.count - 1;
+    for (int c = 0; c < 4; c++) {
+      g.row[c][i] = 0.0;
+      for (int j = 0; j <= TURN; j++)
+        if (from - j >= 0 && from - j < CONTROLS)
+          g.row[c][i] += SHARES.row[from][j] * part[j].row[c][from - j];
+    }
+    for (int j = 0; j <= TURN; j++) g.row[3][i] -= SHARES.row[from][j] * high[j];
   }
-  for (int c = 0; c < 4; c++)
-    for (int k = CONTROLS + 1; k < CONTROL_ROW; k++) g.row[c][k] = g.row[c][CONTROLS];
-  g.count = CONTROLS + 1;
   return lowest(g, links, b, need) > need;
 }
 
