@@ -30,8 +30,12 @@ def judge_all(
     """
     states = starts if starts is not None else [None] * len(trajectories)
     jobs = list(zip(trajectories, states, strict=True))
-    workers = min(threads or os.cpu_count() or 1, max(1, len(jobs)))
-    if workers == 1:
-        return [judge(workcell, trajectory, start, settings) for trajectory, start in jobs]
+
+    def one(job: tuple[Trajectory, JointState | None]) -> Result:
+        return judge(workcell, *job, settings)
+
+    workers = min(threads or os.cpu_count() or 1, len(jobs))
+    if workers <= 1:
+        return [one(job) for job in jobs]
     with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(lambda job: judge(workcell, *job, settings), jobs))
+        return list(pool.map(one, jobs))

@@ -1,8 +1,9 @@
 """
 Certificates: what proves an answer, as a JSON object that anyone can check without the kernels.
 
-Times are exact dyadic parts of segments, numbers are the doubles that were compared. The claims are
-those of ``trajectory_guard.verify``, which shares nothing with the code that made them.
+Times are exact dyadic parts of segments, numbers are the doubles that were compared. What the
+claims mean is said, and proved again, by ``trajectory_guard.verify``, which shares no code with what
+made them.
 """
 
 import hashlib

@@ -51,6 +51,7 @@ def certify(
     :raises TrajectoryGuardError: the path does not fit the robot, or moves nothing that could hit.
     """
     settings = settings or Settings()
+    check_joints(workcell.robot.movable, path)
     if slack is None:
         slack = tracking_slack(workcell.robot.movable, path, (), settings)
     return _answer(workcell, path, settings, slack, time.perf_counter()).result
@@ -59,7 +60,6 @@ def certify(
 def _answer(
     workcell: Workcell, path: JointPath, settings: Settings, slack: np.ndarray, begin: float
 ) -> _Answer:
-    check_joints(workcell.robot.movable, path)
     pairs = workcell.pairs(path.in_path)
     motion = motion_path(workcell, path, slack)
     with stop_flag(settings.deadline_ns) as stop:

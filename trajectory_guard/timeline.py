@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from trajectory_guard.errors import Reason
 from trajectory_guard.kernels import layout
 from trajectory_guard.result import Interval, Status
 
+_STATUS = {int(status): status for status in Status}
 _REASON = {
     layout.BY_TOLERANCE: Reason.TOLERANCE,
     layout.BY_DEPTH: Reason.DEPTH,
@@ -72,47 +74,75 @@ def intervals(
         rows.append(
             Interval(0, unknown_until_ns, Status.SUSPECT, Reason.START_STATE_UNKNOWN.value)
         )
-    start_ns, last_ns = int(knots_ns[0]), int(knots_ns[-1])
-    groups = _groups(leaves)
-    open_end = not _is_whole(leaves, len(knots_ns) - 1)
-    for g, group in enumerate(groups):
-        status = Status(int(group[0]['status']))
-        if g + 1 < len(groups):
-            after = groups[g + 1][0]
-            following = Status(int(after['status']))
-            end_ns = _boundary(status, following, _instant(knots_ns, after, 'start'))
+    knots = knots_ns.tolist()
+    table = _Table(*(leaves[name].tolist() for name in _Table._fields))
+    start_ns, last_ns = knots[0], knots[-1]
+    bounds = _bounds(table)
+    open_end = not _is_whole(table, len(knots) - 1)
+    for first, last in pairwise(bounds):
+        status = _STATUS[table.status[first]]
+        if last < len(leaves):
+            following = _STATUS[table.status[last]]
+            end_ns = _boundary(status, following, _instant(knots, table, last, table.start))
         elif open_end:
-            end_ns = _boundary(status, Status.SUSPECT, _instant(knots_ns, group[-1], 'end'))
+            end = _instant(knots, table, last - 1, table.end)
+            end_ns = _boundary(status, Status.SUSPECT, end)
         else:
             end_ns = last_ns
         end_ns = max(end_ns, start_ns)
-        alone = len(groups) == 1 and not open_end and (not rows or status != Status.FREE)
+        alone = len(bounds) == 2 and not open_end and (not rows or status is not Status.FREE)
         if end_ns > start_ns or alone:
-            rows.append(
-                _merged(knots_ns, group, status, start_ns, end_ns, link_names, obstacle_names)
-            )
+            if status is Status.FREE:
+                rows.append(Interval(start_ns, end_ns, status))
+            else:
+                worst = _worst(table, first, last)
+                place = leaves['place'][worst].tolist()
+                rows.append(
+                    _merged(
+                        knots,
+                        table,
+                        (first, last, worst),
+                        (start_ns, end_ns),
+                        place,
+                        link_names,
+                        obstacle_names,
+                    )
+                )
         start_ns = end_ns
     if open_end:
         rows.append(Interval(start_ns, last_ns, Status.SUSPECT, Reason.NOT_EXAMINED.value))
     return tuple(rows)
 
 
-def _groups(leaves: np.ndarray) -> list[np.ndarray]:
-    """Return runs of leaves with one status and one reason."""
-    status, reason = leaves['status'], leaves['reason']
-    if len(leaves) and (status == layout.FREE).all():
-        return [leaves]
-    cuts = np.flatnonzero((status[1:] != status[:-1]) | (reason[1:] != reason[:-1])) + 1
-    bounds = [0, *cuts.tolist(), len(leaves)]
-    return [leaves[a:b] for a, b in pairwise(bounds) if b > a]
+class _Table(NamedTuple):
+    """The columns of the leaves that make intervals, as plain numbers."""
+
+    segment: list[int]
+    start: list[int]
+    end: list[int]
+    level: list[int]
+    status: list[int]
+    reason: list[int]
+    body: list[int]
+    obstacle: list[int]
+    lower: list[float]
+    upper: list[float]
 
 
-def _is_whole(leaves: np.ndarray, segments: int) -> bool:
+def _bounds(table: _Table) -> list[int]:
+    """Return where runs of leaves with one status and one reason begin, and the end."""
+    kinds = list(zip(table.status, table.reason, strict=True))
+    cuts = [i for i in range(1, len(kinds)) if kinds[i] != kinds[i - 1]]
+    return [0, *cuts, len(kinds)] if kinds else []
+
+
+def _is_whole(table: _Table, segments: int) -> bool:
     """Say whether the leaves reach to the end of the path."""
-    if not len(leaves):
-        return False
-    last = leaves[-1]
-    return bool(last['segment'] == segments - 1 and last['end'] == 1 << int(last['level']))
+    return bool(
+        table.segment
+        and table.segment[-1] == segments - 1
+        and table.end[-1] == 1 << table.level[-1]
+    )
 
 
 def with_witnesses(leaves: np.ndarray) -> np.ndarray:
@@ -148,11 +178,11 @@ def with_witnesses(leaves: np.ndarray) -> np.ndarray:
     return np.concatenate([*pieces, leaves[done:]]) if pieces else leaves
 
 
-def _instant(knots_ns: np.ndarray, leaf: np.void, end: str) -> Instant:
+def _instant(knots: list[int], table: _Table, row: int, numerators: list[int]) -> Instant:
     """Return an end of a leaf."""
-    segment = int(leaf['segment'])
-    knot = int(knots_ns[segment])
-    return Instant(knot, int(knots_ns[segment + 1]) - knot, int(leaf[end]), int(leaf['level']))
+    segment = table.segment[row]
+    knot = knots[segment]
+    return Instant(knot, knots[segment + 1] - knot, numerators[row], table.level[row])
 
 
 def _boundary(left: Status, right: Status, instant: Instant) -> int:
@@ -164,46 +194,50 @@ def _boundary(left: Status, right: Status, instant: Instant) -> int:
     return instant.floor_ns
 
 
+def _worst(table: _Table, first: int, last: int) -> int:
+    """Return the leaf of a run with the smallest gap, or the first if no pair is named."""
+    named = [i for i in range(first, last) if table.body[i] >= 0]
+    return min(named, key=table.upper.__getitem__) if named else first
+
+
 def _merged(
-    knots_ns: np.ndarray,
-    leaves: np.ndarray,
-    status: Status,
-    start_ns: int,
-    end_ns: int,
+    knots: list[int],
+    table: _Table,
+    run: tuple[int, int, int],
+    ends_ns: tuple[int, int],
+    place: list[float],
     link_names: Sequence[str],
     obstacle_names: Sequence[str],
 ) -> Interval:
-    """Return an interval with the pair of the smallest gap among its leaves."""
-    if status == Status.FREE:
-        return Interval(start_ns, end_ns, status)
-    reason = '' if status == Status.COLLISION else _REASON[int(leaves[0]['reason'])].value
-    named = leaves[leaves['body'] >= 0]
-    if not len(named):
-        return Interval(start_ns, end_ns, status, reason)
-    leaf = named[int(named['upper'].argmin())]
-    segment = int(leaf['segment'])
-    knot = int(knots_ns[segment])
+    """Return the interval of a run of leaves, with the pair of the smallest gap among them."""
+    first, last, worst = run
+    status = _STATUS[table.status[first]]
+    reason = '' if status is Status.COLLISION else _REASON[table.reason[first]].value
+    if table.body[worst] < 0:
+        return Interval(*ends_ns, status, reason)
+    segment = table.segment[worst]
+    knot = knots[segment]
     middle = Instant(
         knot,
-        int(knots_ns[segment + 1]) - knot,
-        int(leaf['start']) + int(leaf['end']),
-        int(leaf['level']) + 1,
+        knots[segment + 1] - knot,
+        table.start[worst] + table.end[worst],
+        table.level[worst] + 1,
     )
-    x, y, z = leaf['place'].tolist()
+    x, y, z = place
+    lowest = min(table.lower[i] for i in range(first, last) if table.body[i] >= 0)
     return Interval(
-        start_ns,
-        end_ns,
+        *ends_ns,
         status,
         reason,
-        body=link_names[int(leaf['body'])],
-        obstacle=obstacle_names[int(leaf['obstacle'])],
-        at_ns=min(max(middle.floor_ns, start_ns), end_ns),
+        body=link_names[table.body[worst]],
+        obstacle=obstacle_names[table.obstacle[worst]],
+        at_ns=min(max(middle.floor_ns, ends_ns[0]), ends_ns[1]),
         location=(x, y, z),
-        gap_lower=_finite(named['lower'].min()),
-        gap_upper=_finite(leaf['upper']),
+        gap_lower=_finite(lowest),
+        gap_upper=_finite(table.upper[worst]),
     )
 
 
 def _finite(value: float) -> float | None:
     """Return a number, or None where nothing is known."""
-    return float(value) if math.isfinite(value) else None
+    return value if math.isfinite(value) else None

@@ -113,6 +113,7 @@ class Cover {
       breadth_first();
     else
       depth_first();
+    if (!work.proof.wanted) condense();
   }
 
  private:
@@ -167,6 +168,33 @@ class Cover {
       return std::ldexp(double(a.start), -int(a.level)) <
              std::ldexp(double(b.start), -int(b.level));
     });
+  }
+
+  // Keep of a run of leaves with one status and one reason what tells of the whole: both ends, the
+  // smallest gaps, the widest witness.
+  void condense() {
+    std::vector<Leaf>& leaves = work.leaves;
+    size_t kept = 0;
+    for (size_t first = 0, last; first < leaves.size(); first = last) {
+      size_t nearest = first, lowest = first, widest = first;
+      auto witness = [&](size_t i) {
+        return leaves[i].witness > 0 ? leaves[i].level + leaves[i].witness : INT64_MAX;
+      };
+      for (last = first; last < leaves.size() && leaves[last].status == leaves[first].status &&
+                         leaves[last].reason == leaves[first].reason;
+           last++) {
+        bool named = leaves[last].body >= 0, before = leaves[nearest].body >= 0;
+        if (named && (!before || leaves[last].known.upper < leaves[nearest].known.upper))
+          nearest = last;
+        if (named && (!before || leaves[last].known.lower < leaves[lowest].known.lower))
+          lowest = last;
+        if (witness(last) < witness(widest)) widest = last;
+      }
+      for (size_t i = first; i < last; i++)
+        if (i == first || i + 1 == last || i == nearest || i == lowest || i == widest)
+          leaves[kept++] = leaves[i];
+    }
+    leaves.resize(kept);
   }
 
   // A half of a piece, with the pairs that stayed open from `first` on; all pairs if it was crowded.

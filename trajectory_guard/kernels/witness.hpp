@@ -75,8 +75,8 @@ inline bool moving_witness(const Solids& links, int64_t b, const Solids& obstacl
 
 // Look for a common point at the centre: true if it proves the overlap of the whole piece.
 //
-// fuzz: bound on the error of the centre pose. known: upper, place, depth, near and the witness are
-// written when the point is proved.
+// fuzz: bound on the error of the centre pose. known: upper, place, depth and the witness are written
+// when the point is proved.
 inline bool standing_witness(const Solids& links, int64_t b, const Solids& obstacles, int64_t o,
                              const Node& node, double error, double fuzz, double margin,
                              std::vector<double>& moved, Common& found, Known& known) {
@@ -91,7 +91,6 @@ inline bool standing_witness(const Solids& links, int64_t b, const Solids& obsta
   if (!node.sound) return false;
   error += node.growth.eps * links.length(b, BALL);
   double moves = farthest(found.point, found.place, node.points) + error + 2.0 * margin;
-  known.near = moves - found.mine - found.theirs;
   return moves < found.mine + found.theirs;
 }
 

@@ -76,7 +76,7 @@ class Guard(Node):
             # Reads the meshes: one that is missing must not wait for the scene to be noticed.
             robot.digest()
         self._model = self._model_of(robot)
-        self.get_logger().info('warming up (the very first start takes about a minute)')
+        self.get_logger().info('warming up (the first start compiles the kernels)')
         warm_up()
 
         self.add_on_set_parameters_callback(self._check_parameters)
@@ -204,7 +204,7 @@ def main(args: Sequence[str] | None = None) -> int:
     :returns: exit code: 0 stopped, 2 an argument, a parameter or a file cannot be used, 3 the
         guard does not work here.
     """
-    # Raised into numba, an exception may be swallowed; there is nothing to end in good order yet.
+    # There is nothing to end in good order yet.
     _on_signal(lambda: os._exit(0))
     try:
         _start_ros(sys.argv if args is None else list(args))
