@@ -1,17 +1,19 @@
 """Messages of rosbag2 recordings, sqlite3 and mcap."""
 
+from __future__ import annotations
+
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
-
-from rosbags.highlevel import AnyReader
-from rosbags.typesys import get_typestore, Stores
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from msg_adapters.mcap_tail import ends_early, WholeRecords
 from msg_adapters.sqlite_file import sqlite_damage
 from trajectory_guard.errors import Reason, TrajectoryError
+
+if TYPE_CHECKING:
+    from rosbags.highlevel import AnyReader
 
 STORAGE_SUFFIXES = ('.mcap', '.db3')
 
@@ -71,7 +73,7 @@ class Bag:
             raise self._unreadable(error) from error
         self._damage = self._unreadable(problem) if problem else None
 
-    def __enter__(self) -> 'Bag':
+    def __enter__(self) -> Bag:
         """Return the bag, which is open already."""
         return self
 
@@ -165,6 +167,10 @@ def _opened_as_far_as_possible(path: Path) -> tuple[AnyReader, str | None]:
 
 def _opened(paths: Sequence[Any]) -> AnyReader:
     """Return a reader of the paths, open."""
+    # Takes long to import, and most files are no bags.
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import get_typestore, Stores
+
     reader = AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_JAZZY))
     reader.open()
     return reader

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree, ConvexHull, QhullError
 
 from trajectory_guard.body import U, UNDERFLOW
+from trajectory_guard.unique_rows import unique_rows
 
 # A point farther than this fraction of the size outside the proposed hull becomes a vertex itself;
 # nearer ones are covered by the ball. Far below any tolerance, far above the rounding of qhull.
@@ -26,6 +27,7 @@ class Hull:
     :param ball: radius, rounded up [m].
     :param normals: outward unit normals of the hull's facets, one per plane, (m, 3); a proposal.
         No rows for a flat cloud, of which all points are vertices.
+    :param heights: how far out along its normal each facet lies, within rounding, (m,) [m].
     :param center: mean of the vertices, (3,) [m].
     :param volume: about the volume [m^3].
     """
@@ -33,6 +35,7 @@ class Hull:
     vertices: np.ndarray
     ball: float
     normals: np.ndarray
+    heights: np.ndarray
     center: np.ndarray
     volume: float
 
@@ -52,7 +55,7 @@ def convex_hull(points: np.ndarray) -> Hull:
         middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
         hull = ConvexHull(points - middle)
     except (QhullError, ValueError):
-        return Hull(points, 0.0, np.empty((0, 3)), points.mean(axis=0), 0.0)
+        return Hull(points, 0.0, np.empty((0, 3)), np.empty(0), points.mean(axis=0), 0.0)
     center = points[hull.vertices].mean(axis=0)
     dropped = np.ones(len(points), dtype=bool)
     dropped[hull.vertices] = False
@@ -60,10 +63,12 @@ def convex_hull(points: np.ndarray) -> Hull:
     size = np.ptp(points, axis=0).max()
     far = distance > COVERED_BY_BALL * size
     vertices = np.concatenate((points[hull.vertices], points[dropped][far]))
-    normals = np.unique(hull.equations[:, :3], axis=0)
+    normals, facet = unique_rows(hull.equations[:, :3])
     normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    heights = normals @ middle
+    heights[facet] -= hull.equations[:, 3]
     ball = float(distance[~far].max(initial=0.0))
-    return Hull(vertices, ball, normals, center, float(hull.volume))
+    return Hull(vertices, ball, normals, heights, center, float(hull.volume))
 
 
 def distance_bound(
@@ -92,7 +97,7 @@ def distance_bound(
         inverse /= np.einsum('fk,fk->f', corners[:, 0], inverse[:, 0])[:, None, None]
     inverse[~np.isfinite(inverse)] = math.nan
     bound = np.full(len(x), math.inf)
-    _, triangle = cKDTree(_directions(corners.sum(axis=1))).query(_directions(x))
+    _, triangle = cKDTree(directions(corners.sum(axis=1))).query(directions(x))
     walking = np.arange(len(x))
     for _ in range(LONGEST_WALK):
         b = np.einsum('nki,ni->nk', inverse[triangle], x[walking])
@@ -117,5 +122,6 @@ def _distance(x: np.ndarray, b: np.ndarray, corners: np.ndarray) -> np.ndarray:
     return np.linalg.norm(x - np.einsum('nk,nki->ni', b, corners), axis=1)
 
 
-def _directions(x: np.ndarray) -> np.ndarray:
+def directions(x: np.ndarray) -> np.ndarray:
+    """Return unit vectors, zero for zero."""
     return x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), UNDERFLOW)

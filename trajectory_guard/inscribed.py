@@ -1,14 +1,19 @@
 """A convex polytope that certainly lies inside the solid a mesh bounds."""
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from trajectory_guard.body import U
-from trajectory_guard.hull import Hull
+from trajectory_guard.hull import directions, Hull
 
 # A mesh that fills less of its hull than this is no convex solid, and nothing is tried.
 WORTH_TRYING = 0.9
 
-# Triangles times facets of the hull beyond which nothing is tried: about half a second.
+# A facet that costs a triangle less than this fraction of the size is good enough.
+CHEAP = 2.0**-40
+
+# Triangles times facets of the hull beyond which nothing is tried: if none finds a cheap facet at
+# once that is about half a second, and a polytope of that many faces is slow to ask.
 LARGEST_TABLE = 1 << 25
 
 # Entries of that table held at once: 8 MB.
@@ -35,8 +40,9 @@ def inscribed_polytope(
     three corners v, no triangle meets Q. The surface being closed, every point off it has a
     winding number, which is constant on the connected set Q; one ray from one point of Q finds
     it. If it is not 0, Q is inside. The normals may be any: those of the hull's facets are good.
-    Each triangle takes the g that costs least, and d_g is as large as its triangles allow; for a
-    convex solid that costs rounding only.
+    Each triangle takes the g that costs least, or the one whose normal is nearest to its own if
+    that costs next to nothing, and d_g is as large as its triangles allow; for a convex solid that
+    costs rounding only.
 
     :param points: (n, 3), no two equal [m].
     :param triangles: (m, 3) indices, wound alike.
@@ -55,14 +61,9 @@ def inscribed_polytope(
     volume = np.einsum('ni,ni->', corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
     if not abs(volume) >= WORTH_TRYING * hull.volume or not is_closed(triangles, len(points)):
         return nothing
-    heights = points @ normals.T
-    top = heights.max(axis=0)
+    best = _best_facets(points, triangles, corners, hull)
     offsets = np.full(len(normals), np.inf)
-    step = max(1, CHUNK // len(normals))
-    for start in range(0, len(triangles), step):
-        lowest = heights[triangles[start : start + step]].min(axis=1)
-        best = (lowest - top).argmax(axis=1)
-        np.minimum.at(offsets, best, np.take_along_axis(lowest, best[:, None], axis=1)[:, 0])
+    np.minimum.at(offsets, best, _lowest(points, triangles, normals[best]))
     # A height is a sum of three products, within 4 U of the sum of the absolute values. The centre
     # must be off the real surface, not only off the rounded one: hence the margin twice.
     margin = 8.0 * U * np.abs(points).sum(axis=1).max() + 2.0 * rounding
@@ -71,6 +72,39 @@ def inscribed_polytope(
     if (normals @ hull.center + margin >= offsets)[needed].any() or not winding_number(corners):
         return nothing
     return np.column_stack((normals[needed], offsets[needed]))
+
+
+def _best_facets(
+    points: np.ndarray, triangles: np.ndarray, corners: np.ndarray, hull: Hull
+) -> np.ndarray:
+    """
+    Choose for each triangle the facet that has to be moved least to clear it.
+
+    :param points: (n, 3) [m].
+    :param triangles: (m, 3) indices.
+    :param corners: those points from the hull's centre, (m, 3, 3) [m].
+    :param hull: hull of the points.
+    :returns: (m,) indices of the hull's normals.
+    """
+    normals = hull.normals
+    own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    # Either side may be the outer one, but of all triangles the same: that of a positive volume.
+    own *= np.sign(np.einsum('ni,ni->', own, corners[:, 0]))
+    _, best = cKDTree(normals).query(directions(own))
+    cost = hull.heights[best] - _lowest(points, triangles, normals[best])
+    dear = np.flatnonzero(~(cost <= CHEAP * np.abs(points).max()))
+    step = max(1, CHUNK // len(normals))
+    for start in range(0, len(dear), step):
+        rows = dear[start : start + step]
+        lowest = (points[triangles[rows]] @ normals.T).min(axis=1)
+        best[rows] = (lowest - hull.heights).argmax(axis=1)
+    return best
+
+
+def _lowest(points: np.ndarray, triangles: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return the least height of each triangle's corners along its normal, (m,) [m]."""
+    lowest: np.ndarray = np.einsum('nki,ni->nk', points[triangles], normals).min(axis=1)
+    return lowest
 
 
 def is_closed(triangles: np.ndarray, count: int) -> bool:

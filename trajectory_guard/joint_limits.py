@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-# Columns b_0 .. b_5 from the power coefficients c_1 .. c_5: b_i = sum_k C(i, k) / C(5, k) c_k.
+# Control points b_0 .. b_5 of p - c_0 from the power coefficients c_0 .. c_5:
+# b_i = sum_{k>0} C(i, k) / C(5, k) c_k; zero times c_0 is a zero, which rounds nothing.
 _BERNSTEIN = np.array(
     [
-        [0.0, 1 / 5, 2 / 5, 3 / 5, 4 / 5, 1.0],
-        [0.0, 0.0, 1 / 10, 3 / 10, 6 / 10, 1.0],
-        [0.0, 0.0, 0.0, 1 / 10, 4 / 10, 1.0],
-        [0.0, 0.0, 0.0, 0.0, 1 / 5, 1.0],
-        [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 1 / 5, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 2 / 5, 1 / 10, 0.0, 0.0, 0.0],
+        [0.0, 3 / 5, 3 / 10, 1 / 10, 0.0, 0.0],
+        [0.0, 4 / 5, 6 / 10, 4 / 10, 1 / 5, 0.0],
+        [0.0, 1.0, 1.0, 1.0, 1.0, 1.0],
     ]
 )
+
+# Of p - c_0 and of c_0 - p.
+_CONTROL = np.concatenate([_BERNSTEIN, -_BERNSTEIN])
+_SIGNS = np.array([1.0, -1.0])[:, None, None]
 
 # De Casteljau at 1/2: control points of the left half; the right half is its mirror image.
 _LEFT = (
@@ -44,6 +52,7 @@ _DEPTH = 28
 # 6 a halving, as the weights of either are non-negative and sum to at most 1; at most
 # 7 + 6 * 28 = 175 u together, and the rest of 256 u is for the comparisons.
 _ROUNDING = 256 * _UNIT
+_MOVING = np.array([0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
 
 
 class LimitExcess(NamedTuple):
@@ -78,36 +87,31 @@ def limit_excess(
     value at either end; halving brings the two together quadratically. Every comparison adds the
     error of p to the value, so None proves that lower - tolerance <= p <= upper + tolerance for
     all s, and a result is wrong by no more than twice that error. A curve that does not move
-    is judged exactly.
+    is judged exactly. A joint without a limit on a side cannot leave it there.
 
     :param coefficients: (S, n, 6) power basis on [0, 1] [rad or m].
     :param error: (S, n) bound on the sum of the errors of the coefficients [rad or m].
-    :param lower: (n,) [rad or m].
-    :param upper: (n,) [rad or m].
+    :param lower: (n,) [rad or m]; -inf: none.
+    :param upper: (n,) [rad or m]; inf: none.
     :param tolerance: not negative [rad or m].
     :returns: the largest excess on the first segment that has one, or None.
     """
-    start, rest = coefficients[..., 0], coefficients[..., 1:]
-    control = (_BERNSTEIN.T @ rest.reshape(-1, 5).T).reshape(6, *start.shape)
-    above = below = error + _ROUNDING * (np.abs(rest) @ np.ones(5))
-    if tolerance > 0.0:
-        above = above + 4.0 * _UNIT * (np.abs(upper) + tolerance)
-        below = below + 4.0 * _UNIT * (np.abs(lower) + tolerance)
-    room_above = (upper + tolerance) - start
-    room_below = start - (lower - tolerance)
+    start = coefficients[..., 0]
+    flat = coefficients.reshape(-1, 6)
+    limits, allowed, rounding = _allowance(tuple(lower.tolist()), tuple(upper.tolist()), tolerance)
+    # Both sides as one upper limit: of p, and of -p.
+    control = _CONTROL.dot(flat.T).reshape(2, 6, *start.shape)
+    peak = np.maximum.reduce(control, axis=1)
+    room = allowed - _SIGNS * start
+    margin = error + _ROUNDING * np.abs(flat).dot(_MOVING).reshape(start.shape) + rounding
     # Written so that a NaN counts as an excess.
-    near_upper = ~(control.max(axis=0) + above <= room_above)
-    near_lower = ~(below - control.min(axis=0) <= room_below)
-    if not (near_upper.any() or near_lower.any()):
+    inside = peak + margin <= room
+    if np.count_nonzero(inside) == inside.size:
         return None
-    near = np.stack([near_upper, near_lower])
+    near = ~inside & (limits != math.inf)
     side, segment, joint = np.nonzero(near)
     sign = np.where(side == 0, 1.0, -1.0)
-    out = _exceeds(
-        control[:, segment, joint].T * sign[:, None],
-        np.stack([above, below])[near],
-        np.stack([room_above, room_below])[near],
-    )
+    out = _exceeds(control[side, :, segment, joint], margin[near], room[near])
     if not out.any():
         return None
     found = []
@@ -118,6 +122,26 @@ def limit_excess(
         s, value = _maximum(sign[i] * coefficients[first, j])
         found.append(LimitExcess(int(first), int(j), s, float(sign[i]) * value, limit))
     return max(found, key=lambda excess: abs(excess.value - excess.limit))
+
+
+@lru_cache(maxsize=64)
+def _allowance(
+    lower: tuple[float, ...], upper: tuple[float, ...], tolerance: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """
+    Return what p and -p may reach, and a bound on its rounding.
+
+    :param lower: n lower limits [rad or m].
+    :param upper: n upper limits [rad or m].
+    :param tolerance: not negative [rad or m].
+    :returns: of p and of -p the limits, these with the tolerance, and the bound, (2, 1, n) each.
+    """
+    limits = np.array((upper, [-limit for limit in lower]))[:, None]
+    rounding = 4.0 * _UNIT * (np.abs(limits) + tolerance) if tolerance > 0.0 else 0.0 * _SIGNS
+    arrays = limits, limits + tolerance, rounding
+    for array in arrays:
+        array.setflags(write=False)
+    return arrays
 
 
 def _exceeds(control: np.ndarray, margin: np.ndarray, allowed: np.ndarray) -> np.ndarray:

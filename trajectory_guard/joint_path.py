@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from trajectory_guard.errors import Reason, RequestError, TrajectoryError
+from trajectory_guard.errors import Reason, RequestError, RobotError, TrajectoryError
 from trajectory_guard.hermite import hermite, Knots
 from trajectory_guard.joint_limits import limit_excess
 from trajectory_guard.mimic import follow, followers
@@ -68,7 +70,8 @@ class JointPath:
                 )
             array.setflags(write=False)
             object.__setattr__(self, name, array)
-        if not (np.diff(self.knots_ns) >= 0).all() or self.knots_ns[0] < 0:
+        knots = self.knots_ns
+        if np.count_nonzero(knots[1:] < knots[:-1]) or knots[0] < 0:
             raise RequestError(Reason.UNSORTED_TIMES, f'knots_ns must rise, got {self.knots_ns}')
 
     @property
@@ -138,46 +141,118 @@ def joint_path(
             raise RequestError(
                 Reason.INVALID_PARAMETER, f'{what} must be finite and not negative, got {value!r}'
             )
-    _check_names(robot_joints, trajectory.joint_names)
+    try:
+        roles = _roles(tuple(robot_joints), trajectory.joint_names)
+    except RobotError:
+        # Of the two errors the message's own comes first.
+        if not allow_nonzero_end_velocity:
+            _check_end_velocity(trajectory)
+        raise
     if not allow_nonzero_end_velocity:
         _check_end_velocity(trajectory)
-    joints = [joint for joint in robot_joints if joint.type is not JointType.FIXED]
-    column = {name: i for i, name in enumerate(trajectory.joint_names)}
-    commanded = [j for j, joint in enumerate(joints) if joint.name in column]
-    mimics = followers(joints)
     knots = with_start(
-        _knots(trajectory, [column[joints[j].name] for j in commanded]),
-        [joints[j] for j in commanded],
+        _knots(trajectory, roles.columns),
+        [roles.joints[j] for j in roles.commanded],
         start,
         allowed_start_tolerance,
-        {joints[leader].name for _, leader in mimics},
+        roles.followed,
     )
+    still = len(knots.times_ns) == 1
+    joints = len(roles.joints)
     with np.errstate(all='ignore'):
-        curve, curve_error = hermite(knots if len(knots.times_ns) > 1 else _pose(knots))
-        coefficients = np.zeros((len(curve), len(joints), 6))
-        error = np.zeros((len(curve), len(joints)))
-        coefficients[:, commanded] = curve
-        error[:, commanded] = curve_error
-        coefficients[:, :, 0] += _held_positions(joints, column, start)
-        in_path = np.zeros(len(joints), dtype=np.bool_)
-        in_path[commanded] = True
-        for j, leader in mimics:
-            follow(coefficients, error, joints[j], j, leader)
-            in_path[j] = in_path[leader]
+        coefficients, error = hermite(_pose(knots) if still else knots)
+        segments = len(coefficients)
+        if len(roles.commanded) < joints:
+            curve, curve_error = coefficients, error
+            coefficients = np.zeros((segments, joints, 6))
+            error = np.zeros((segments, joints))
+            coefficients[:, roles.commanded] = curve
+            error[:, roles.commanded] = curve_error
+        if roles.held:
+            coefficients[:, roles.held, 0] = _held_positions(roles, start)
+        for j, leader in roles.mimics:
+            follow(coefficients, error, roles.joints[j], j, leader)
         path = JointPath(
-            joint_names=tuple(joint.name for joint in joints),
-            in_path=in_path,
-            knots_ns=knots.times_ns if len(knots.times_ns) > 1 else np.repeat(knots.times_ns, 2),
+            joint_names=roles.names,
+            in_path=roles.in_path,
+            knots_ns=np.repeat(knots.times_ns, 2) if still else knots.times_ns,
             coefficients=coefficients,
             coefficient_error=error,
             unknown_until_ns=int(knots.times_ns[0]),
             limits_checked=check_joint_limits,
         )
-        first_end = len(trajectory.times_ns) - len(curve)
+        first_end = len(trajectory.times_ns) - segments
         _check_size(path, first_end)
         if check_joint_limits:
-            _check_limits(path, joints, joint_limit_tolerance, first_end)
+            _check_limits(path, roles, joint_limit_tolerance, first_end)
     return path
+
+
+class _Roles(NamedTuple):
+    """
+    What the joints of a robot do while a trajectory for some of them is played.
+
+    :param joints: n movable joints in the robot's order.
+    :param names: their names.
+    :param commanded: indices of those that the trajectory moves.
+    :param columns: the trajectory's column of each commanded joint; None: as they come.
+    :param held: indices of those that neither the trajectory nor a mimic moves.
+    :param mimics: mimic joint and followed joint, as indices, in the order of following.
+    :param followed: names of the joints that others mimic.
+    :param in_path: (n,) bool, as in the path.
+    :param lower: (n,) lower limits to check, -inf where none is [rad or m].
+    :param upper: (n,) upper limits to check, inf where none is [rad or m].
+    """
+
+    joints: tuple[Joint, ...]
+    names: tuple[str, ...]
+    commanded: tuple[int, ...]
+    columns: tuple[int, ...] | None
+    held: tuple[int, ...]
+    mimics: tuple[tuple[int, int], ...]
+    followed: frozenset[str]
+    in_path: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+
+# A robot is asked about again and again, mostly for the same joints. Clients choose the names, so
+# the number of answers kept is bounded.
+@lru_cache(maxsize=64)
+def _roles(robot_joints: tuple[Joint, ...], names: tuple[str, ...]) -> _Roles:
+    """Return the roles of a robot's joints; raises as `joint_path` does."""
+    _check_names(robot_joints, names)
+    joints = tuple(joint for joint in robot_joints if joint.type is not JointType.FIXED)
+    column = {name: i for i, name in enumerate(names)}
+    commanded = [j for j, joint in enumerate(joints) if joint.name in column]
+    columns = tuple(column[joints[j].name] for j in commanded)
+    mimics = followers(joints)
+    in_path = np.zeros(len(joints), dtype=np.bool_)
+    in_path[commanded] = True
+    for j, leader in mimics:
+        in_path[j] = in_path[leader]
+    limited = [
+        inside and joint.type is not JointType.CONTINUOUS
+        for inside, joint in zip(in_path.tolist(), joints, strict=True)
+    ]
+    lower = np.where(limited, [joint.lower for joint in joints], -math.inf)
+    upper = np.where(limited, [joint.upper for joint in joints], math.inf)
+    for array in (in_path, lower, upper):
+        array.setflags(write=False)
+    return _Roles(
+        joints=joints,
+        names=tuple(joint.name for joint in joints),
+        commanded=tuple(commanded),
+        columns=None if columns == tuple(range(len(names))) else columns,
+        held=tuple(
+            j for j, joint in enumerate(joints) if joint.mimic is None and joint.name not in column
+        ),
+        mimics=tuple(mimics),
+        followed=frozenset(joints[leader].name for _, leader in mimics),
+        in_path=in_path,
+        lower=lower,
+        upper=upper,
+    )
 
 
 def _check_names(robot_joints: Sequence[Joint], names: Sequence[str]) -> None:
@@ -202,25 +277,31 @@ def _check_names(robot_joints: Sequence[Joint], names: Sequence[str]) -> None:
 def _check_end_velocity(trajectory: Trajectory) -> None:
     if not trajectory.has_velocities[-1]:
         return
-    moving = np.flatnonzero(np.abs(trajectory.velocities[-1]) > _REST_VELOCITY)
-    if moving.size:
-        j = moving[0]
-        raise TrajectoryError(
-            Reason.NONZERO_END_VELOCITY,
-            f'the last point moves joint {trajectory.joint_names[j]!r} '
-            f'at {trajectory.velocities[-1, j]:.9g}',
-        )
+    for name, velocity in zip(
+        trajectory.joint_names, trajectory.velocities[-1].tolist(), strict=True
+    ):
+        if abs(velocity) > _REST_VELOCITY:
+            raise TrajectoryError(
+                Reason.NONZERO_END_VELOCITY,
+                f'the last point moves joint {name!r} at {velocity:.9g}',
+            )
 
 
-def _knots(trajectory: Trajectory, columns: Sequence[int]) -> Knots:
+def _knots(trajectory: Trajectory, columns: Sequence[int] | None) -> Knots:
+    positions, velocities = trajectory.positions, trajectory.velocities
+    accelerations = trajectory.accelerations
+    if columns is not None:
+        positions = positions.take(columns, axis=1)
+        velocities = velocities.take(columns, axis=1)
+        accelerations = accelerations.take(columns, axis=1)
     return Knots(
         times_ns=trajectory.times_ns,
-        positions=trajectory.positions[:, columns],
-        velocities=trajectory.velocities[:, columns],
+        positions=positions,
+        velocities=velocities,
         has_velocities=trajectory.has_velocities,
-        accelerations=trajectory.accelerations[:, columns],
+        accelerations=accelerations,
         has_accelerations=trajectory.has_accelerations,
-        start_error=np.zeros(len(columns)),
+        start_error=np.zeros(positions.shape[1]),
     )
 
 
@@ -238,31 +319,27 @@ def _pose(knots: Knots) -> Knots:
     )
 
 
-def _held_positions(
-    joints: Sequence[Joint], commanded: Collection[str], start: JointState | None
-) -> np.ndarray:
-    """Return (n,) start positions of the joints that neither the message nor a mimic moves."""
-    held = np.zeros(len(joints))
+def _held_positions(roles: _Roles, start: JointState | None) -> list[float]:
+    """Return the start positions of the joints that neither the message nor a mimic moves."""
     known = {} if start is None else dict(zip(start.joint_names, start.positions, strict=True))
-    unknown = []
-    for j, joint in enumerate(joints):
-        if joint.mimic is None and joint.name not in commanded:
-            if joint.name in known:
-                held[j] = known[joint.name]
-            else:
-                unknown.append(repr(joint.name))
+    names = [roles.names[j] for j in roles.held]
+    unknown = [repr(name) for name in names if name not in known]
     if unknown:
         raise TrajectoryError(
             Reason.JOINT_POSITION_UNKNOWN,
             'neither the trajectory nor the start state gives ' + ', '.join(unknown),
         )
-    return held
+    return [known[name] for name in names]
 
 
 def _check_size(path: JointPath, first_end: int) -> None:
-    finite = np.isfinite(path.coefficients), np.isfinite(path.coefficient_error)
-    if not (finite[0].all() and finite[1].all()):
-        i, j = np.argwhere(~(finite[0].all(axis=-1) & finite[1]))[0]
+    # A sum of squares is finite only if all of them are.
+    squares = (np.vdot(array, array) for array in (path.coefficients, path.coefficient_error))
+    if all(map(math.isfinite, squares)):
+        return
+    finite = np.isfinite(path.coefficients).all(axis=-1) & np.isfinite(path.coefficient_error)
+    if not finite.all():
+        i, j = np.argwhere(~finite)[0]
         raise TrajectoryError(
             Reason.TOO_LARGE,
             f'the motion of joint {path.joint_names[j]!r} to point {first_end + i} is too large '
@@ -270,20 +347,9 @@ def _check_size(path: JointPath, first_end: int) -> None:
         )
 
 
-def _check_limits(
-    path: JointPath, joints: Sequence[Joint], tolerance: float, first_end: int
-) -> None:
-    limited = [
-        j
-        for j, joint in enumerate(joints)
-        if path.in_path[j] and joint.type is not JointType.CONTINUOUS
-    ]
+def _check_limits(path: JointPath, roles: _Roles, tolerance: float, first_end: int) -> None:
     excess = limit_excess(
-        path.coefficients[:, limited],
-        path.coefficient_error[:, limited],
-        np.array([joints[j].lower for j in limited]),
-        np.array([joints[j].upper for j in limited]),
-        tolerance,
+        path.coefficients, path.coefficient_error, roles.lower, roles.upper, tolerance
     )
     if excess is None:
         return
@@ -292,7 +358,7 @@ def _check_limits(
     upper = excess.value > excess.limit
     raise TrajectoryError(
         Reason.JOINT_LIMIT,
-        f'joint {joints[limited[excess.joint]].name!r} reaches {excess.value:.9g} at '
+        f'joint {roles.names[excess.joint]!r} reaches {excess.value:.9g} at '
         f'{time:.9g} s, on the way to point {first_end + excess.segment}; its '
         f'{"upper" if upper else "lower"} limit is {excess.limit:.9g}, '
         f'joint_limit_tolerance {tolerance:g}',

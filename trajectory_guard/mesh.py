@@ -8,11 +8,10 @@ import numpy as np
 
 from trajectory_guard.body import ConvexBody, LARGEST_COORDINATE, U
 from trajectory_guard.errors import Reason, RobotError
-from trajectory_guard.hull import convex_hull
-from trajectory_guard.inscribed import inscribed_polytope
 from trajectory_guard.mesh_formats import READERS, Triangles
 from trajectory_guard.resource import places
 from trajectory_guard.robot import Loaded
+from trajectory_guard.unique_rows import unique_rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +66,15 @@ def mesh_body(mesh: Triangles, scale: tuple[float, float, float] = (1.0, 1.0, 1.
     :param scale: factor along x, y, z.
     :raises ValueError: a scaled coordinate is too large.
     """
+    # Brings scipy, half of the time that the whole package takes to import.
+    from trajectory_guard.hull import convex_hull
+    from trajectory_guard.inscribed import inscribed_polytope
+
     scaled = mesh.points * scale + 0.0
     if not np.abs(scaled).max() <= LARGEST_COORDINATE:
         raise ValueError(f'a coordinate exceeds {LARGEST_COORDINATE:g} m')
-    points, inverse = np.unique(scaled, axis=0, return_inverse=True)
-    triangles = inverse.reshape(-1)[mesh.triangles]
+    points, inverse = unique_rows(scaled)
+    triangles = inverse[mesh.triangles]
     # The file's rounding grows with the scale; scaling rounds each coordinate by U.
     rounding = 2.0 * mesh.rounding * max(map(abs, scale))
     if scale != (1.0, 1.0, 1.0):

@@ -57,7 +57,7 @@ def follow(coefficients: np.ndarray, error: np.ndarray, joint: Joint, j: int, le
     assert joint.mimic is not None
     _, multiplier, offset = joint.mimic
     followed = multiplier * coefficients[:, leader]
-    size = np.abs(followed).sum(axis=-1)
+    size = np.add.reduce(np.abs(followed), axis=-1)
     followed[:, 0] += offset
     coefficients[:, j] = followed
     error[:, j] = (

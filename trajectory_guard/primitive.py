@@ -2,11 +2,10 @@
 
 from dataclasses import dataclass
 from functools import cache
-from itertools import product
+from itertools import combinations, product
 import math
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from trajectory_guard.body import ConvexBody, LARGEST_COORDINATE, read_only, U
 from trajectory_guard.errors import Reason, RobotError
@@ -92,21 +91,35 @@ def sphere_directions() -> tuple[np.ndarray, float]:
     Return unit normals of a polytope inside the unit ball, and the distance of its faces.
 
     With directions n_i whose convex hull contains a ball of radius r, every unit x has some
-    n_i . x >= r. So {x: n_i . x <= r for all i} lies inside the unit ball.
+    n_i . x >= r. So {x: n_i . x <= r for all i} lies inside the unit ball. The triangles between
+    the directions enclose the middle, and the nearest of their planes has a distance of r.
 
     :returns: normals (m, 3) and r, rounded down.
     """
     golden = 0.5 + math.sqrt(1.25)
     corners = [(0.0, a, b * golden) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
     points = np.array([np.roll(corner, k) for corner in corners for k in range(3)])
+    # Neighbours on the icosahedron are 2 apart, others at least twice the golden ratio.
+    near = np.linalg.norm(points[:, None] - points, axis=2) < 2.5
+    triangles = np.array(
+        [t for t in combinations(range(12), 3) if all(near[i, j] for i, j in combinations(t, 2))]
+    )
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     for _ in range(SPHERE_SUBDIVISIONS):
-        triangles = ConvexHull(points).simplices
-        edges = np.unique(np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)), axis=0)
-        middles = points[edges].mean(axis=1)
+        edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
+        edges, middle = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
+        middles = points[edges].sum(axis=1)
+        middles /= np.linalg.norm(middles, axis=1, keepdims=True)
+        a, b, c = triangles.T
+        ab, bc, ca = middle.reshape(-1, 3).T + len(points)
+        triangles = np.concatenate(
+            [np.stack(t, axis=1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+        )
         points = np.concatenate((points, middles))
-        points /= np.linalg.norm(points, axis=1, keepdims=True)
-    inradius = -ConvexHull(points).equations[:, 3].max()
+    p, q, r = np.moveaxis(points[triangles], 1, 0)
+    normals = np.cross(q - p, r - p)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    inradius = np.abs(np.einsum('ni,ni->n', normals, p)).min()
     return read_only(points), float(inradius * (1.0 - INWARD))
 
 

@@ -52,25 +52,23 @@ def tracking_slack(
             Reason.INVALID_TRACKING_TOLERANCE,
             f'tracking_tolerance has {len(values)} values for {len(commanded)} joints',
         )
+    in_path = path.in_path.tolist()
     if len(values) == 1:
         named = {
-            joint.name: values[0]
-            for joint, inside in zip(movable, path.in_path, strict=True)
-            if inside
+            joint.name: values[0] for joint, inside in zip(movable, in_path, strict=True) if inside
         }
     else:
         named = dict(zip(commanded, values, strict=True))
-    slack = np.zeros(len(movable))
-    for j, (joint, inside) in enumerate(zip(movable, path.in_path, strict=True)):
-        if not inside:
-            continue
+    by_name = {joint.name: joint for joint in movable}
+    slack = []
+    for joint, inside in zip(movable, in_path, strict=True):
         factor = 1.0
         leader = joint
-        while leader.mimic is not None:
+        while inside and leader.mimic is not None:
             factor *= abs(leader.mimic.multiplier) * (1.0 + 2.0**-50)
-            leader = next(other for other in movable if other.name == leader.mimic.joint)
-        slack[j] = named[leader.name] * factor
-    return slack
+            leader = by_name[leader.mimic.joint]
+        slack.append(named[leader.name] * factor if inside else 0.0)
+    return np.array(slack, dtype=np.float64)
 
 
 def motion_path(workcell: Workcell, path: JointPath, slack: np.ndarray) -> Path:

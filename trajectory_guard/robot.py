@@ -115,6 +115,7 @@ class Robot:
     :param joints: all joints in topological order, fixed ones included.
     :param collisions: collision geometries of the links that have any, in the order of links.
     :param source: bytes of the description, for the digest.
+    :param movable: all joints that are not fixed, mimic joints included, in the order of joints.
     """
 
     name: str
@@ -122,20 +123,21 @@ class Robot:
     joints: tuple[Joint, ...]
     collisions: Mapping[str, tuple[Collision, ...]] = field(repr=False)
     source: bytes = field(repr=False)
+    movable: tuple[Joint, ...] = field(init=False, repr=False)
     _shapes: dict[Shape, Loaded] = field(init=False, repr=False, default_factory=dict)
     _bodies: dict[str, tuple[ConvexBody, ...]] = field(
         init=False, repr=False, default_factory=dict
     )
 
+    def __post_init__(self) -> None:
+        """List the movable joints, which every request asks for."""
+        movable = tuple(joint for joint in self.joints if joint.type is not JointType.FIXED)
+        object.__setattr__(self, 'movable', movable)
+
     @property
     def links(self) -> tuple[str, ...]:
         """All links, the root first, then the child of each joint."""
         return (self.root, *(joint.child for joint in self.joints))
-
-    @property
-    def movable(self) -> tuple[Joint, ...]:
-        """All joints that are not fixed, mimic joints included, in topological order."""
-        return tuple(joint for joint in self.joints if joint.type is not JointType.FIXED)
 
     @property
     def collision_links(self) -> tuple[str, ...]:

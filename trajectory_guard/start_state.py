@@ -47,55 +47,74 @@ def with_start(
     :raises TrajectoryError: the start state lacks some of the joints, does not agree with a point
         0 at time 0, or leaves open which way round a continuous joint will turn.
     """
-    column = {} if start is None else {name: i for i, name in enumerate(start.joint_names)}
-    lacking = [joint.name for joint in joints if joint.name not in column]
-    if start is None or len(lacking) == len(joints):
+    if start is None:
         return knots
-    if lacking:
+    column = {name: i for i, name in enumerate(start.joint_names)}
+    columns = [column[joint.name] for joint in joints if joint.name in column]
+    if not columns:
+        return knots
+    if len(columns) < len(joints):
+        lacking = [joint.name for joint in joints if joint.name not in column]
         raise TrajectoryError(
             Reason.START_STATE_UNKNOWN,
             'the start state lacks commanded joints: ' + ', '.join(map(repr, lacking)),
         )
-    columns = [column[joint.name] for joint in joints]
-    measured, target = start.positions[columns], knots.positions[0]
-    continuous = np.array([joint.type is JointType.CONTINUOUS for joint in joints])
-    with np.errstate(all='ignore'):
-        turns = np.where(continuous, np.rint((target - measured) / _TURN), 0.0)
-        position = measured + turns * _TURN
-        error = 4.0 * _UNIT * (np.abs(measured) + np.abs(target) + _TURN * (np.abs(turns) + 1.0))
-        error = np.where(turns != 0.0, error, 0.0)
-        distance = np.abs(target - position) + error
-    at_once = knots.times_ns[0] == 0
-    for i, joint in enumerate(joints):
-        if turns[i] != 0.0 and joint.name in followed:
+    measured = start.positions.take(columns).tolist()
+    target = knots.positions[0].tolist()
+    at_once = bool(knots.times_ns[0] == 0)
+    # One joint at a time, as plain floats: they overflow to inf and warn of nothing.
+    positions, errors = [], []
+    for joint, q, q0 in zip(joints, measured, target, strict=True):
+        continuous = joint.type is JointType.CONTINUOUS
+        turns = _whole((q0 - q) / _TURN) if continuous else 0.0
+        position = q + turns * _TURN
+        error = 0.0
+        if turns != 0.0:
+            error = 4.0 * _UNIT * (abs(q) + abs(q0) + _TURN * (abs(turns) + 1.0))
+            if joint.name in followed:
+                raise TrajectoryError(
+                    Reason.START_STATE_MISMATCH,
+                    f'joint {joint.name!r} starts at {q:.9g}, whole turns from point 0 at '
+                    f'{q0:.9g}, and other joints mimic it',
+                )
+        distance = abs(q0 - position) + error
+        if at_once and not distance <= allowed_start_tolerance:
             raise TrajectoryError(
                 Reason.START_STATE_MISMATCH,
-                f'joint {joint.name!r} starts at {measured[i]:.9g}, whole turns from point 0 at '
-                f'{target[i]:.9g}, and other joints mimic it',
+                f'joint {joint.name!r} starts at {q:.9g}, but point 0 at time 0 has '
+                f'{q0:.9g}; allowed_start_tolerance is {allowed_start_tolerance:g}',
             )
-        if at_once and not distance[i] <= allowed_start_tolerance:
+        if not at_once and continuous and not distance < math.pi - _HALF_TURN_BAND:
             raise TrajectoryError(
                 Reason.START_STATE_MISMATCH,
-                f'joint {joint.name!r} starts at {measured[i]:.9g}, but point 0 at time 0 has '
-                f'{target[i]:.9g}; allowed_start_tolerance is {allowed_start_tolerance:g}',
-            )
-        if not at_once and continuous[i] and not distance[i] < math.pi - _HALF_TURN_BAND:
-            raise TrajectoryError(
-                Reason.START_STATE_MISMATCH,
-                f'continuous joint {joint.name!r} starts at {measured[i]:.9g}, within '
-                f'{_HALF_TURN_BAND:g} rad of half a turn from point 0 at {target[i]:.9g}: it may '
+                f'continuous joint {joint.name!r} starts at {q:.9g}, within '
+                f'{_HALF_TURN_BAND:g} rad of half a turn from point 0 at {q0:.9g}: it may '
                 'turn either way; add a point in between',
             )
+        positions.append(position)
+        errors.append(error)
     if at_once:
         return knots
-    rest = np.zeros(len(joints))
-    velocity = rest if start.velocities is None else start.velocities[columns]
+    velocity = 0.0 if start.velocities is None else start.velocities.take(columns)
     return Knots(
-        times_ns=np.concatenate([[0], knots.times_ns]),
-        positions=np.vstack([position, knots.positions]),
-        velocities=np.vstack([velocity, knots.velocities]),
-        has_velocities=np.concatenate([knots.has_velocities[:1], knots.has_velocities]),
-        accelerations=np.vstack([rest, knots.accelerations]),
-        has_accelerations=np.concatenate([knots.has_accelerations[:1], knots.has_accelerations]),
-        start_error=error,
+        times_ns=_after(0, knots.times_ns),
+        positions=_after(positions, knots.positions),
+        velocities=_after(velocity, knots.velocities),
+        has_velocities=_after(knots.has_velocities[0], knots.has_velocities),
+        accelerations=_after(0.0, knots.accelerations),
+        has_accelerations=_after(knots.has_accelerations[0], knots.has_accelerations),
+        start_error=np.array(errors),
     )
+
+
+def _whole(turns: float) -> float:
+    """Round to the nearest integer, ties to even; what is beyond 2^52 is one, or infinite."""
+    return float(round(turns)) if abs(turns) < 2.0**52 else turns
+
+
+def _after(first: object, rows: np.ndarray) -> np.ndarray:
+    """Return the rows with one more in front."""
+    longer = np.empty((len(rows) + 1, *rows.shape[1:]), rows.dtype)
+    longer[0] = first
+    longer[1:] = rows
+    return longer

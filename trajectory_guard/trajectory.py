@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+import hashlib
+import json
+import math
 from operator import index
 from typing import NamedTuple
 
@@ -76,11 +79,11 @@ class Trajectory:
             flags = np.array(getattr(self, field), dtype=np.bool_)
             _set(self, field, _frozen(flags, (size,), field))
         self._check_times()
-        self._check_finite('position', self.positions, np.ones(size, dtype=np.bool_))
+        self._check_finite('position', self.positions, None)
         self._check_finite('velocity', self.velocities, self.has_velocities)
         self._check_finite('acceleration', self.accelerations, self.has_accelerations)
-        alone = np.flatnonzero(self.has_accelerations & ~self.has_velocities)
-        if alone.size:
+        if np.count_nonzero(self.has_accelerations > self.has_velocities):
+            alone = np.flatnonzero(self.has_accelerations & ~self.has_velocities)
             raise TrajectoryError(
                 Reason.ACCELERATIONS_WITHOUT_VELOCITIES,
                 f'point {alone[0]} has accelerations but no velocities',
@@ -103,32 +106,39 @@ class Trajectory:
             raise TrajectoryError(Reason.NO_POINTS, 'the trajectory has no points')
         joint_names = _distinct(joint_names, 'the trajectory')
         dof = len(joint_names)
-        times_ns, *fields = zip(*points, strict=True)
-        names = Point._fields[1:]
-        for field, rows in zip(names, fields, strict=True):
-            for i, row in enumerate(rows):
-                size = _size(row, field, i)
-                if size == 0 and field == 'positions':
-                    raise _without_positions(i, points[i])
-                if size not in (0, dof):
-                    raise TrajectoryError(
-                        Reason.SIZE_MISMATCH, f'point {i} has {size} {field} for {dof} joints'
-                    )
-        table = {
-            field: _table(rows, dof, field) for field, rows in zip(names, fields, strict=True)
-        }
+        times_ns, *columns = zip(*points, strict=True)
+        fields = dict(zip(Point._fields[1:], columns, strict=True))
+        sizes = _sizes(fields, points, dof)
+        tables = {field: _table(rows, dof, field, sizes[field]) for field, rows in fields.items()}
         trajectory = cls(
-            joint_names=joint_names,
-            times_ns=_times(times_ns),
-            positions=table['positions'][0],
-            velocities=table['velocities'][0],
-            has_velocities=table['velocities'][1],
-            accelerations=table['accelerations'][0],
-            has_accelerations=table['accelerations'][1],
-            name=name,
+            joint_names,
+            times_ns,  # type: ignore[arg-type]
+            tables['positions'][0],
+            *tables['velocities'],
+            *tables['accelerations'],
+            name,
         )
-        trajectory._check_finite('effort', *table['effort'])
+        trajectory._check_finite('effort', *tables['effort'])
         return trajectory
+
+    def digest(self) -> str:
+        """
+        Return the SHA-256 of what shapes the path, in hex: names, times, points; not the label.
+
+        Values that a point does not carry, and the sign of a zero, do not count.
+        """
+        digest = hashlib.sha256(json.dumps(['trajectory/1', *self.joint_names]).encode())
+        digest.update(self.times_ns.astype('<i8').tobytes())
+        every = np.ones(len(self.times_ns), dtype=np.bool_)
+        for carried, values in (
+            (every, self.positions),
+            (self.has_velocities, self.velocities),
+            (self.has_accelerations, self.accelerations),
+        ):
+            digest.update(carried.astype(np.uint8).tobytes())
+            # Adding 0 makes one zero of the two.
+            digest.update((np.where(carried[:, None], values, 0.0) + 0.0).astype('<f8').tobytes())
+        return digest.hexdigest()
 
     def _check_times(self) -> None:
         times_ns = self.times_ns
@@ -136,17 +146,22 @@ class Trajectory:
             raise TrajectoryError(
                 Reason.NEGATIVE_TIME, f'point 0 has the negative time {times_ns[0]} ns'
             )
-        late = np.flatnonzero(times_ns[1:] <= times_ns[:-1])
-        if late.size:
-            i = late[0] + 1
+        late = times_ns[1:] <= times_ns[:-1]
+        if np.count_nonzero(late):
+            i = np.flatnonzero(late)[0] + 1
             raise TrajectoryError(
                 Reason.UNSORTED_TIMES,
                 f'point {i} at {times_ns[i]} ns does not come after point {i - 1} '
                 f'at {times_ns[i - 1]} ns',
             )
 
-    def _check_finite(self, what: str, values: np.ndarray, rows: np.ndarray) -> None:
-        wrong = ~np.isfinite(values) & rows[:, None]
+    def _check_finite(self, what: str, values: np.ndarray, rows: np.ndarray | None) -> None:
+        """Refuse numbers that are not finite; rows: (P,) which rows to look at, None: all."""
+        if _all_finite(values):
+            return
+        wrong = ~np.isfinite(values)
+        if rows is not None:
+            wrong &= rows[:, None]
         if wrong.any():
             i, j = np.argwhere(wrong)[0]
             raise TrajectoryError(
@@ -183,6 +198,8 @@ class JointState:
             what_of = f'joint state {field}'
             array = _frozen(_numbers(values, what_of), (len(joint_names),), what_of)
             _set(self, field, array)
+            if _all_finite(array):
+                continue
             for name, value in zip(joint_names, array, strict=True):
                 if not np.isfinite(value):
                     raise TrajectoryError(
@@ -203,10 +220,17 @@ def _frozen(array: np.ndarray, shape: tuple[int, ...], field: str) -> np.ndarray
     return array
 
 
+def _all_finite(values: np.ndarray) -> bool:
+    """Tell at once that all are finite; False says nothing, for squares may overflow."""
+    return math.isfinite(np.vdot(values, values))
+
+
 def _distinct(joint_names: Sequence[str], where: str) -> tuple[str, ...]:
     names = tuple(joint_names)
     if not names:
         raise TrajectoryError(Reason.NO_JOINTS, f'{where} names no joints')
+    if set(map(type, names)) == {str} and len(set(names)) == len(names):
+        return names
     seen: set[str] = set()
     for name in names:
         if not isinstance(name, str):
@@ -227,6 +251,35 @@ def _without_positions(i: int, point: Point) -> TrajectoryError:
     return TrajectoryError(Reason.MISSING_POSITIONS, f'point {i} has no positions')
 
 
+def _sizes(
+    fields: Mapping[str, Sequence[Sequence[float]]], points: Sequence[Point], dof: int
+) -> dict[str, set[int]]:
+    """
+    Return the sizes that the rows of each field have, which are dof and 0.
+
+    :param fields: of each field the rows of all points.
+    :param points: the points.
+    :param dof: number of joints.
+    :raises TrajectoryError: for the first row of another size, and for one without positions.
+    """
+    try:
+        sizes = {field: set(map(len, rows)) for field, rows in fields.items()}
+        if 0 not in sizes['positions'] and all(each <= {0, dof} for each in sizes.values()):
+            return sizes
+    except TypeError:
+        pass
+    for field, rows in fields.items():
+        for i, row in enumerate(rows):
+            size = _size(row, field, i)
+            if size == 0 and field == 'positions':
+                raise _without_positions(i, points[i])
+            if size not in (0, dof):
+                raise TrajectoryError(
+                    Reason.SIZE_MISMATCH, f'point {i} has {size} {field} for {dof} joints'
+                )
+    raise AssertionError('one of the rows must be wrong')
+
+
 def _size(row: Sequence[float], field: str, i: int) -> int:
     try:
         return len(row)
@@ -237,6 +290,13 @@ def _size(row: Sequence[float], field: str, i: int) -> int:
 
 
 def _times(times_ns: Sequence[int] | np.ndarray) -> np.ndarray:
+    """Return an int64 copy of integers, which numpy alone would also take from floats."""
+    try:
+        array = np.array(times_ns)
+    except (TypeError, ValueError, OverflowError):
+        array = np.array('')
+    if array.dtype == np.int64 and array.ndim == 1 and array.min() >= -_INT64_MAX:
+        return array
     for i, time_ns in enumerate(times_ns):
         try:
             value = index(time_ns)
@@ -255,27 +315,41 @@ def _times(times_ns: Sequence[int] | np.ndarray) -> np.ndarray:
 def _numbers(values: Sequence[float] | Sequence[Sequence[float]], field: str) -> np.ndarray:
     """Return a float64 copy of what numpy reads as numbers; it would also read text."""
     try:
-        array = np.array(values)
+        array = np.array(values, order='C')
     except (TypeError, ValueError, OverflowError):
         array = np.array('')
+    if array.dtype == np.float64:
+        return array
     if array.dtype.kind not in 'iuf' and array.size:
         raise TrajectoryError(Reason.TRAJECTORY_UNREADABLE, f'{field}: not all are numbers')
     return array.astype(np.float64, order='C')
 
 
-def _table(rows: Sequence[Sequence[float]], dof: int, field: str) -> tuple[np.ndarray, np.ndarray]:
+def _table(
+    rows: Sequence[Sequence[float]], dof: int, field: str, sizes: Collection[int]
+) -> tuple[np.ndarray, np.ndarray]:
     """
     Stack one field of all points.
 
     :param rows: one row a point, of dof values or empty.
+    :param dof: number of joints.
+    :param field: what they are, for the message.
+    :param sizes: the sizes that occur.
     :returns: (P, dof) values with zeros for empty rows, and (P,) which rows are not empty.
     """
-    present = np.array([len(row) > 0 for row in rows])
     table = np.zeros((len(rows), dof))
-    given = [row for row in rows if len(row) > 0]
-    if given:
-        values = _numbers(given, field)
-        if values.shape != (len(given), dof):
-            raise TrajectoryError(Reason.TRAJECTORY_UNREADABLE, f'{field}: rows are not flat')
-        table[present] = values
+    present = np.zeros(len(rows), dtype=np.bool_)
+    if dof not in sizes:
+        return table, present
+    if 0 in sizes:
+        present[:] = [len(row) > 0 for row in rows]
+        rows = [row for row in rows if len(row) > 0]
+    else:
+        present[:] = True
+    values = _numbers(rows, field)
+    if values.shape != (len(rows), dof):
+        raise TrajectoryError(Reason.TRAJECTORY_UNREADABLE, f'{field}: rows are not flat')
+    if 0 not in sizes:
+        return values, present
+    table[present] = values
     return table, present

@@ -22,14 +22,14 @@ def read_obj(content: bytes) -> Triangles:
     polygons: list[list[int]] = []
     text = content.decode('utf-8', 'replace').replace('\\\r\n', ' ').replace('\\\n', ' ')
     for number, line in enumerate(text.split('\n'), 1):
-        words = line.partition('#')[0].split()
+        words = line.partition('#')[0].split() if '#' in line else line.split()
         if not words or words[0] in IGNORED:
             continue
         try:
             if words[0] == 'v':
                 points.append(_point(words[1:]))
             elif words[0] == 'f':
-                polygons.append([_index(word, len(points)) for word in words[1:]])
+                polygons.append(_polygon(words[1:], len(points)))
             else:
                 raise ValueError('unknown statement')
         except ValueError as error:
@@ -39,12 +39,25 @@ def read_obj(content: bytes) -> Triangles:
 
 def _point(words: list[str]) -> list[float]:
     """Return x y z of `x y z [w]` or, with colours, `x y z r g b [a]`."""
-    values = [float(word) for word in words]
-    if len(values) not in (3, 4, 6, 7):
+    values = list(map(float, words))
+    if len(values) == 3:
+        return values
+    if len(values) not in (4, 6, 7):
         raise ValueError(f'a vertex with {len(values)} numbers')
     if len(values) == 4 and values[3] != 1.0:
         raise ValueError(f'a vertex with weight {values[3]}')
     return values[:3]
+
+
+def _polygon(words: list[str], count: int) -> list[int]:
+    """Return the positions of the vertices of a face."""
+    try:
+        indices = [int(word.partition('/')[0]) for word in words]
+        if 1 <= min(indices) and max(indices) <= count:
+            return [index - 1 for index in indices]
+    except ValueError:
+        pass  # The first word that is wrong says why.
+    return [_index(word, count) for word in words]
 
 
 def _index(word: str, count: int) -> int:

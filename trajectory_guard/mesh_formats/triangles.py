@@ -52,6 +52,9 @@ def fans(polygons: Iterable[Sequence[int]]) -> np.ndarray:
     :returns: (m, 3) int64.
     :raises ValueError: a polygon has fewer than three corners.
     """
+    polygons = list(polygons)
+    if set(map(len, polygons)) == {3}:
+        return np.array(polygons, dtype=np.int64)
     rows: list[tuple[int, int, int]] = []
     for polygon in polygons:
         if len(polygon) < 3:
