@@ -346,12 +346,71 @@ def test_a_bad_robot_or_scene_is_one_line(cell: Cell, robot: str, scene: str, sa
     assert said in run.stderr
 
 
+def test_certificates_are_written_and_hold(cell: Cell) -> None:
+    """Of one trajectory a file, of several a folder; `verify` proves them again."""
+    one = cell.folder / 'one.json'
+    assert cell.check(FREE, '--certificate', one).exit_code == 0
+    folder = f'{cell.folder}/proofs/new/'
+    plans = cell.file('plans.yaml', '---\n'.join([FREE, WRONG, HIT, LATE]))
+    run = cell.run(plans, '--certificate', folder, '--json')
+    assert run.exit_code == 2
+    assert len(run.stdout.splitlines()) == 4
+    assert sorted(path.name for path in Path(folder).iterdir()) == [
+        f'000{k}-plans.yaml-{k}.json' for k in (1, 3, 4)
+    ]
+    for proofs, plan, verdicts in (
+        (one, cell.folder / 'plan.yaml', ['free']),
+        (folder, plans, ['free', 'collision', 'suspect']),
+    ):
+        arguments = cell.arguments('verify', proofs, '--trajectory', plan, '--json')
+        found = CliRunner().invoke(app, arguments, catch_exceptions=False)
+        assert found.exit_code == 0, found.output
+        assert [json.loads(line)['verdict'] for line in found.stdout.splitlines()] == verdicts
+
+
+def test_a_file_is_not_enough_for_several_certificates(cell: Cell) -> None:
+    """Nothing is judged or written then, and what stands there stays."""
+    target = cell.file('proof.json', 'mine')
+    run = cell.check('---\n'.join([FREE, HIT]), '--certificate', target)
+    assert run.exit_code == 2
+    assert run.stdout == ''
+    assert f"'{target}' is one file" in run.stderr
+    assert target.read_text() == 'mine'
+    # But a rejected trajectory leaves no certificate of an earlier run behind.
+    assert cell.check(WRONG, '--certificate', target).exit_code == 2
+    assert not target.exists()
+
+
+@pytest.mark.parametrize('target', ['missing/proof.json', 'plan.yaml/', '/dev/full'])
+def test_a_certificate_that_cannot_be_written_is_bad_input(cell: Cell, target: str) -> None:
+    run = cell.check(FREE, '--certificate', f'{cell.folder}/{target}')
+    assert run.exit_code == 2
+    assert 'error: --certificate: cannot write' in run.stderr
+    assert run.stderr.count('\n') == 1
+    assert not list(cell.folder.glob('.*'))
+
+
+def test_scope_leaves_the_rest_unexamined(cell: Cell) -> None:
+    (whole,), (first,), (verdict,) = (
+        cell.results(HIT, '--scope', scope) for scope in ('all', 'first', 'verdict')
+    )
+    assert first['intervals'][0] == whole['intervals'][0]
+    assert first['intervals'][-1]['reason'] == 'not_examined'
+    assert first['pieces'] < whole['pieces']
+    assert verdict['verdict'] == whole['verdict'] == 'collision'
+    wrong = cell.check(HIT, '--scope', 'most')
+    assert wrong.exit_code == 2
+    assert "'most' is not one of all, first, verdict" in wrong.output
+
+
 def test_help_lists_what_there_is_and_nothing_else() -> None:
     run = CliRunner().invoke(app, ['check', '--help'])
     assert run.exit_code == 0
     for option in ('--urdf', '--scene', '--start', '--deadline', '--json', '--scene-pose'):
         assert option in run.stdout
-    for later in ('--srdf', '--certificate', '--report'):
+    for option in ('--certificate', '--scope'):
+        assert option in run.stdout
+    for later in ('--srdf', '--report'):
         assert later not in run.stdout
 
 
@@ -646,7 +705,7 @@ def test_the_module_runs_without_ros(cell: Cell) -> None:
 def test_help_imports_nothing_heavy() -> None:
     code = (
         'import sys, trajectory_guard.command_line.app; '
-        'print({"numpy", "scipy", "numba", "rosbags", "yaml", "rclpy"} & set(sys.modules))'
+        'print({"numpy", "scipy", "flint", "rosbags", "yaml", "rclpy"} & set(sys.modules))'
     )
     assert python('-c', code).stdout == 'set()\n'
     run = python('-m', 'trajectory_guard', '--help')

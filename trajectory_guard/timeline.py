@@ -154,28 +154,31 @@ def with_witnesses(leaves: np.ndarray) -> np.ndarray:
 
     :param leaves: (L,) LEAF in time order.
     """
-    if not leaves['witness'].any():
+    witness = leaves['witness'].tolist()
+    if not any(witness):
         return leaves
-    changes = np.flatnonzero(np.diff(leaves['status'] == layout.FREE)) + 1
-    pieces, done = [], 0
-    for first, last in pairwise([0, *changes.tolist(), len(leaves)]):
-        run = leaves[first:last]
-        known = np.flatnonzero(run['witness'])
-        if not len(known) or (run['status'] == layout.COLLISION).any():
+    status, level = leaves['status'].tolist(), leaves['level'].tolist()
+    chosen = []
+    first = 0
+    for last in range(1, len(status) + 1):
+        if last < len(status) and (status[last] == layout.FREE) == (status[first] == layout.FREE):
             continue
-        finest = run['level'][known] + run['witness'][known]
-        row = first + int(known[finest.argmin()])
-        w = int(leaves['witness'][row])
-        cut = np.repeat(leaves[row : row + 1], 3)
+        known = [i for i in range(first, last) if witness[i] > 0]
+        if known and layout.COLLISION not in status[first:last]:
+            chosen.append(min(known, key=lambda i: level[i] + witness[i]))
+        first = last
+    rows = sorted([*range(len(status)), *chosen, *chosen])
+    cut = leaves[rows]
+    for k, row in enumerate(chosen):
+        w = witness[row]
         start = int(leaves['start'][row]) << (w + 1)
         middle = start + (1 << w)
-        cut['start'] = start, middle - 1, middle + 1
-        cut['end'] = middle - 1, middle + 1, int(leaves['end'][row]) << (w + 1)
-        cut['level'] += w + 1
-        cut['status'][1] = layout.COLLISION
-        pieces += [leaves[done:row], cut]
-        done = row + 1
-    return np.concatenate([*pieces, leaves[done:]]) if pieces else leaves
+        three = slice(row + 2 * k, row + 2 * k + 3)
+        cut['start'][three] = start, middle - 1, middle + 1
+        cut['end'][three] = middle - 1, middle + 1, int(leaves['end'][row]) << (w + 1)
+        cut['level'][three] = level[row] + w + 1
+        cut['status'][row + 2 * k + 1] = layout.COLLISION
+    return cut
 
 
 def _instant(knots: list[int], table: _Table, row: int, numerators: list[int]) -> Instant:

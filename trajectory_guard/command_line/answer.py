@@ -2,15 +2,18 @@
 
 from collections.abc import Iterator, Mapping
 import dataclasses
+from itertools import islice
+from pathlib import Path
 
 import numpy as np
 
 from trajectory_guard.certify import judge
+from trajectory_guard.command_line.certificates import Certificates, is_folder
 from trajectory_guard.command_line.options import Pose
 from trajectory_guard.command_line.request import Request, SELF_COLLISION_WARNING
 from trajectory_guard.command_line.sources import Selection, Source, sources
 from trajectory_guard.command_line.start import completed, depends_on_duration, without
-from trajectory_guard.errors import Reason, TrajectoryError
+from trajectory_guard.errors import Reason, RequestError, TrajectoryError
 from trajectory_guard.pose import pose_matrix
 from trajectory_guard.result import Result
 from trajectory_guard.robot import Robot
@@ -43,9 +46,30 @@ def answers(request: Request) -> Iterator[Result]:
     # Else the first answer's time would be that of loading or compiling the kernels.
     warm_up()
     selection = Selection(request.topics, request.joint_state_topics)
-    for path in request.paths:
-        for source in sources(path, selection, request.bags_only):
+    found = (s for path in request.paths for s in sources(path, selection, request.bags_only))
+    if request.certificate is None:
+        for source in found:
             yield _answer(source, workcell, request)
+        return
+    target = Path(request.certificate)
+    folder = is_folder(target, request.certificate)
+    certificates = Certificates(target, folder)
+    for source in found if folder else _only(found, request.certificate):
+        result = _answer(source, workcell, request)
+        certificates.write(result)
+        yield result
+
+
+def _only(found: Iterator[Source], target: str) -> list[Source]:
+    """Return the one source there is; a file has no room for the certificates of several."""
+    some = list(islice(found, 2))
+    if len(some) > 1:
+        raise RequestError(
+            Reason.INVALID_PARAMETER,
+            f'--certificate: there are several trajectories, {target!r} is one file; '
+            f'a folder takes them: {target.removesuffix(".json")}/',
+        )
+    return some
 
 
 def _answer(source: Source, workcell: Workcell, request: Request) -> Result:

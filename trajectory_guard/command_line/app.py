@@ -1,4 +1,4 @@
-"""The commands ``check`` and ``replay``."""
+"""The commands ``check``, ``replay`` and ``verify``."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from trajectory_guard.command_line import options
-from trajectory_guard.command_line.request import Request
-from trajectory_guard.command_line.run import run
+from trajectory_guard.command_line.request import Request, Verification
+from trajectory_guard.command_line.run import run, run_verify
 from trajectory_guard.settings import Settings
 
 _DEFAULTS = Settings()
@@ -50,6 +50,8 @@ def check(
     no_joint_limits: options.NoJointLimits = False,
     allow_end_velocity: options.AllowEndVelocity = False,
     deadline: options.Deadline = None,
+    scope: options.ScopeOption = _DEFAULTS.scope,
+    certificate: options.Certificate = None,
     json: options.Json = False,
 ) -> None:
     """Certify trajectories from files; of a bag, what `replay` would take."""
@@ -58,6 +60,8 @@ def check(
         clearance=clearance,
         tracking_tolerance=(tracking_tolerance,),
         deadline_ns=deadline,
+        scope=scope,
+        want_certificate=certificate is not None,
         check_joint_limits=not no_joint_limits,
         allow_nonzero_end_velocity=allow_end_velocity,
     )
@@ -69,6 +73,7 @@ def check(
         start=start or {},
         paths=trajectories,
         self_collision=not no_self_collision,
+        certificate=certificate,
     )
     raise typer.Exit(run(request, json=json))
 
@@ -91,6 +96,8 @@ def replay(
     no_joint_limits: options.NoJointLimits = False,
     allow_end_velocity: options.AllowEndVelocity = False,
     deadline: options.Deadline = None,
+    scope: options.ScopeOption = _DEFAULTS.scope,
+    certificate: options.Certificate = None,
     json: options.Json = False,
 ) -> None:
     """Certify recorded trajectories, each from the joint state measured last before it."""
@@ -99,6 +106,8 @@ def replay(
         clearance=clearance,
         tracking_tolerance=(tracking_tolerance,),
         deadline_ns=deadline,
+        scope=scope,
+        want_certificate=certificate is not None,
         check_joint_limits=not no_joint_limits,
         allow_nonzero_end_velocity=allow_end_velocity,
     )
@@ -113,5 +122,33 @@ def replay(
         joint_state_topics=joint_states or (),
         bags_only=True,
         self_collision=not no_self_collision,
+        certificate=certificate,
     )
     raise typer.Exit(run(request, json=json))
+
+
+@app.command()
+def verify(
+    certificates: Annotated[
+        list[Path],
+        typer.Argument(metavar='CERTIFICATE', help='JSON file, or a folder of such files.'),
+    ],
+    urdf: options.Urdf,
+    scene: options.Scenes,
+    trajectory: options.Trajectories,
+    scene_pose: options.ScenePose = None,
+    json: options.Json = False,
+) -> None:
+    """
+    Prove again what certificates claim, without the code that made them.
+
+    Exit codes: 0 every certificate holds, 1 one does not, 2 bad input, 3 internal error.
+    """
+    verification = Verification(
+        urdf=urdf,
+        scenes=scene,
+        scene_pose=scene_pose,
+        certificates=certificates,
+        trajectories=trajectory,
+    )
+    raise typer.Exit(run_verify(verification, json=json))

@@ -7,10 +7,16 @@ from trajectory_guard.result import Result, Verdict
 
 
 class ExitCode(IntEnum):
-    """Exit codes of every command; of several answers the largest counts."""
+    """
+    Exit codes of every command; of several answers the largest counts.
+
+    `verify` asks whether certificates prove what they claim, whatever that is.
+    """
 
     ALL_FREE = 0
+    ALL_PROVED = 0
     NOT_FREE = 1
+    NOT_PROVED = 1
     BAD_INPUT = 2
     INTERNAL_ERROR = 3
 

@@ -10,7 +10,7 @@ import typer
 
 from trajectory_guard.errors import RequestError
 from trajectory_guard.result import NANOSECONDS
-from trajectory_guard.settings import Settings
+from trajectory_guard.settings import Scope, Settings
 
 # Thirty years; timers fail at three hundred [s].
 LONGEST_DEADLINE = 1e9
@@ -113,6 +113,15 @@ def _parse_tracking_tolerance(text: str) -> float:
     return value
 
 
+def _parse_scope(text: str | Scope) -> Scope:
+    """Return the scope of that name; the default comes as it is."""
+    for scope in Scope:
+        if text in (scope, scope.name.lower()):
+            return scope
+    names = ', '.join(scope.name.lower() for scope in Scope)
+    raise typer.BadParameter(f'{text!r} is not one of {names}')
+
+
 _FILE: dict[str, Any] = {'exists': True, 'dir_okay': False, 'readable': True}
 _LENGTH: dict[str, Any] = {'metavar': 'METRES', 'show_default': True}
 
@@ -126,6 +135,14 @@ Scenes = Annotated[
         **_FILE,
         metavar='FILE',
         help='Obstacles: a URDF without movable joints, or a mesh. May be repeated.',
+    ),
+]
+Trajectories = Annotated[
+    list[Path],
+    typer.Option(
+        '--trajectory',
+        metavar='FILE',
+        help='Where the trajectories are: YAML, JSON or a bag. May be repeated.',
     ),
 ]
 ScenePose = Annotated[
@@ -186,6 +203,23 @@ Deadline = Annotated[
         parser=parse_deadline,
         metavar='SECONDS',
         help='Time for each answer; what is not decided by then is "suspect".',
+    ),
+]
+Certificate = Annotated[
+    str | None,
+    typer.Option(
+        metavar='OUT.json',
+        help='Write what proves the answer; a folder (OUT/) for several trajectories.',
+    ),
+]
+ScopeOption = Annotated[
+    Scope,
+    typer.Option(
+        '--scope',
+        parser=_parse_scope,
+        metavar='|'.join(scope.name.lower() for scope in Scope),
+        show_default='all',
+        help='How much is asked: all intervals, up to the first that is not free, or any.',
     ),
 ]
 Json = Annotated[

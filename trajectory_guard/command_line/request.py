@@ -27,6 +27,7 @@ class Request:
     :param joint_state_topics: JointState topics read of bags; empty: ``/joint_states``.
     :param bags_only: refuse text files.
     :param self_collision: links were to be checked against each other.
+    :param certificate: file or folder for certificates, as it was written; None: none.
     """
 
     urdf: Path
@@ -39,3 +40,23 @@ class Request:
     joint_state_topics: Sequence[str] = ()
     bags_only: bool = False
     self_collision: bool = True
+    certificate: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """
+    What one run of ``verify`` asks for.
+
+    :param urdf: the robot.
+    :param scenes: files of the scene.
+    :param scene_pose: of the scene in the root link; None: the same frame.
+    :param certificates: files, or folders of them.
+    :param trajectories: where the trajectories are that the certificates are about.
+    """
+
+    urdf: Path
+    scenes: Sequence[Path]
+    scene_pose: Pose | None
+    certificates: Sequence[Path]
+    trajectories: Sequence[Path]

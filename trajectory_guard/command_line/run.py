@@ -1,18 +1,29 @@
 """Run a request: print each answer as it comes, and say how it went."""
 
-from collections.abc import Iterator
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import TextIOWrapper
 import logging
 import os
 import sys
 import traceback
+from typing import TYPE_CHECKING
 
 from trajectory_guard.command_line.exit_code import exit_code, ExitCode
 from trajectory_guard.command_line.printable import printable
-from trajectory_guard.command_line.request import Request, SELF_COLLISION_WARNING
+from trajectory_guard.command_line.request import (
+    Request,
+    SELF_COLLISION_WARNING,
+    Verification,
+)
 from trajectory_guard.errors import TrajectoryGuardError
 from trajectory_guard.result import Verdict
+
+if TYPE_CHECKING:
+    from trajectory_guard.command_line.json_lines import JsonLines
+    from trajectory_guard.command_line.report import Report
 
 # Set it to see where an internal error comes from.
 DEBUG_VARIABLE = 'TRAJECTORY_GUARD_DEBUG'
@@ -25,10 +36,31 @@ def run(request: Request, json: bool) -> ExitCode:
     :param request: what to judge, against what.
     :param json: print one JSON object a line on stdout, and nothing else there.
     """
+    return _guarded(lambda: _run(request, json))
+
+
+def run_verify(verification: Verification, json: bool) -> ExitCode:
+    """
+    Verify certificates, print the findings and return the exit code.
+
+    :param verification: what to verify, against what.
+    :param json: print one JSON object a line on stdout, and nothing else there.
+    """
+
+    def work() -> ExitCode:
+        from trajectory_guard.command_line.verification import verify_all
+
+        return verify_all(verification, json)
+
+    return _guarded(work)
+
+
+def _guarded(work: Callable[[], ExitCode]) -> ExitCode:
+    """Return the exit code of some work; whatever goes wrong is said in one line."""
     debug = bool(os.environ.get(DEBUG_VARIABLE))
     try:
         with _quiet(debug):
-            return _run(request, json)
+            return work()
     except TrajectoryGuardError as error:
         _say(f'error: {error}')
         return ExitCode.BAD_INPUT
@@ -45,15 +77,13 @@ def run(request: Request, json: bool) -> ExitCode:
 def _run(request: Request, json: bool) -> ExitCode:
     """Print the results and return the exit code."""
     from trajectory_guard.command_line.answer import answers
-    from trajectory_guard.command_line.json_lines import JsonLines
-    from trajectory_guard.command_line.report import Report
     from trajectory_guard.kernels.compiled import COMPILING, is_cold
 
     if request.self_collision:
         _say(f'note: {SELF_COLLISION_WARNING}')
     if is_cold():
         _say(f'note: {COMPILING}')
-    output = JsonLines(sys.stdout) if json else Report(sys.stdout)
+    output = _output(json)
     code = ExitCode.ALL_FREE
     judged = rejected = 0
     for result in answers(request):
@@ -68,6 +98,17 @@ def _run(request: Request, json: bool) -> ExitCode:
     if rejected and not json:
         _say(f'error: {rejected} of {judged} trajectories rejected')
     return code
+
+
+def _output(json: bool) -> JsonLines | Report:
+    """Return what prints the results."""
+    if json:
+        from trajectory_guard.command_line.json_lines import JsonLines
+
+        return JsonLines(sys.stdout)
+    from trajectory_guard.command_line.report import Report
+
+    return Report(sys.stdout)
 
 
 @contextmanager
