@@ -230,8 +230,7 @@ class Cover {
     int64_t first = static_cast<int64_t>(work.live.size());
     crowded = task.whole && !open_all(piece, examined);
     if (crowded) return true;
-    if (!task.whole)
-      open_some(task, examined);
+    if (!task.whole) open_some(task, examined);
     int64_t last = static_cast<int64_t>(work.live.size());
     Known worst{};
     if (last == first) {
@@ -257,10 +256,10 @@ class Cover {
     for (int64_t i = 0; i < request.body_count; i++) {
       int64_t b = request.bodies[i];
       Body& body = motion.stand(b, examined);
-      scan(motion.links, b, ask.boxes, request.clearance, body, [&](int64_t o) {
-        work.live.push_back({b, o, {}, {}, {}, {}});
-      });
-      wide = wide || body.sweep > WIDE * (motion.links.length(b, CORE) + motion.links.length(b, BALL));
+      scan(motion.links, b, ask.boxes, request.clearance, body,
+           [&](int64_t o) { work.live.push_back({b, o, {}, {}, {}, {}}); });
+      wide =
+          wide || body.sweep > WIDE * (motion.links.length(b, CORE) + motion.links.length(b, BALL));
       if (wide && int64_t(work.live.size()) - first > CROWD && piece.level < DEEPEST_LEVEL) {
         work.live.resize(first);
         return false;
@@ -293,8 +292,7 @@ class Cover {
       Body& body = motion.stand(live.body, examined);
       if (swept_clear(motion.links, live.body, ask.obstacles, live.obstacle, request.clearance,
                       body))
-        work.proof.add(task.piece, examined,
-                       {BALLS_APART, 0, live.body, live.obstacle, {}, 0.0});
+        work.proof.add(task.piece, examined, {BALLS_APART, 0, live.body, live.obstacle, {}, 0.0});
       else
         work.live.push_back(live);
     }

@@ -273,8 +273,7 @@ struct Basis {
       for (int step = 0; step < n; step++)
         for (int i = step + 1; i >= 0; i--)
           c[i] = (i > 0 ? c[i - 1] : 0.0) + (step < k ? -1.0 : 1.0) * (i <= step ? c[i] : 0.0);
-      for (int i = 0; i < CONTROL_ROW; i++)
-        row[k][i] = i <= n ? c[i] / binomial(n, i) : row[k][n];
+      for (int i = 0; i < CONTROL_ROW; i++) row[k][i] = i <= n ? c[i] / binomial(n, i) : row[k][n];
     }
   }
 };

@@ -1,0 +1,44 @@
+"""A batch on one thread and on two."""
+
+from collections.abc import Iterator
+import dataclasses
+
+from bench.cases import Bench, settings
+from bench.clock import interleaved
+from trajectory_guard.batch import judge_all
+from trajectory_guard.result import Result
+
+SPEED_UP = 1.8
+THREADS = 2
+
+# So often a batch has each trajectory, so that starting threads is a small part of it.
+REPEAT = 10
+
+
+def threads(benches: list[Bench]) -> Iterator[dict]:
+    """Yield a row a robot."""
+    for bench in benches:
+        trajectories = [case.trajectory for case in bench.cases] * REPEAT
+
+        def run(n: int, bench=bench, trajectories=trajectories) -> list[Result]:
+            return judge_all(bench.cell, trajectories, settings=settings(), threads=n)
+
+        best = interleaved({'1': lambda run=run: run(1), '2': lambda run=run: run(THREADS)}, 3)
+        speed_up = best['1'][0] / best['2'][0]
+        equal = [timeless(r) for r in best['1'][1]] == [timeless(r) for r in best['2'][1]]
+        yield {
+            'table': 'threads',
+            'robot': bench.name,
+            'trajectories': len(trajectories),
+            'one_thread_s': best['1'][0],
+            'two_threads_s': best['2'][0],
+            'speed_up': speed_up,
+            'equal': equal,
+            'target': f'speed_up >= {SPEED_UP}, equal',
+            'met': equal and speed_up >= SPEED_UP,
+        }
+
+
+def timeless(result: Result) -> Result:
+    """Return a result without the time it took."""
+    return dataclasses.replace(result, compute_time=0.0)
