@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 import dataclasses
+import json
 import math
 from pathlib import Path
 import signal
@@ -37,11 +38,12 @@ from trajectory_msgs.msg import JointTrajectory
 
 from msg_adapters.result import result_from_message
 from msg_adapters.trajectory import joint_state_from_message, trajectory_from_message
+from trajectory_guard.certificate import text
 from trajectory_guard.certify import judge
 from trajectory_guard.demo.files import panda_urdf
 from trajectory_guard.errors import Reason
 from trajectory_guard.result import Result, Verdict
-from trajectory_guard.ros.guard import Guard, main, NO_CERTIFICATE
+from trajectory_guard.ros.guard import Guard, main
 from trajectory_guard.scene import load_scene
 from trajectory_guard.settings import Settings
 from trajectory_guard.urdf import load_robot
@@ -159,13 +161,16 @@ def test_the_cases_differ(workcell: Workcell) -> None:
     assert len({result.intervals for result in starts}) == 3
 
 
-def test_no_certificate_yet(guard: GuardProcess, ask: Asker, workcell: Workcell) -> None:
-    response = ask.ask('arm', request(HIT, want_certificate=True))
-    assert response.certificate == ''
-    plain = expected(workcell, request(HIT))
-    assert timeless(result_from_message(response.result)) == dataclasses.replace(
-        plain, warnings=(*plain.warnings, NO_CERTIFICATE)
-    )
+def test_certificate_is_that_of_the_library(
+    guard: GuardProcess, ask: Asker, workcell: Workcell
+) -> None:
+    asked = request(HIT, want_certificate=True)
+    response = ask.ask('arm', asked)
+    assert timeless(result_from_message(response.result)) == expected(workcell, request(HIT))
+    trajectory = trajectory_from_message(asked.trajectory)
+    settings = dataclasses.replace(MINIMUM, want_certificate=True)
+    assert response.certificate == text(judge(workcell, trajectory, None, settings).certificate)
+    assert json.loads(response.certificate)['verdict'] == 'collision'
 
 
 def test_deadline_leaves_a_suspect(guard: GuardProcess, ask: Asker) -> None:
@@ -460,7 +465,6 @@ def test_robot_from_topic(files: Path, ask: Asker) -> None:
             assert (result.verdict, result.reason_code) == (Verdict.REJECTED, Reason.NOT_READY)
             assert '/late/robot_description' in result.message
             assert 'robot_description_file' in result.message
-            assert result.warnings == (NO_CERTIFICATE,)
 
             publish['late'](String(data=ARM.replace('</joint>', '', 1)))
             until(ask, 'late', Verdict.REJECTED, 'broken XML')
