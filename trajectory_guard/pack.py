@@ -131,42 +131,42 @@ def _box(body: ConvexBody) -> tuple[np.ndarray, np.ndarray]:
 
     The smallest of a few candidate frames is taken; whatever the frame, the sides are measured.
     """
-    best: tuple[float, np.ndarray, np.ndarray, np.ndarray] | None = None
-    for R in _frames(body):
-        local = body.vertices @ R
-        # |r - (r.a) a| for every box axis r; 1 - (r.a)^2 would cancel where they are parallel.
-        across = R - np.outer(body.disc_axis, body.disc_axis @ R)
-        reach = body.disc_radius * np.linalg.norm(across, axis=0)
-        low, high = local.min(axis=0) - reach, local.max(axis=0) + reach
-        scale = 1e-3 * float((high - low).max())
-        volume = float(np.prod(high - low + scale))
-        if best is None or volume < best[0]:
-            best = volume, R, 0.5 * (low + high), 0.5 * (high - low)
-    assert best is not None
-    _, R, middle, half = best
-    rounding = 32.0 * 2.0**-53 * (np.abs(body.vertices).max() * 3.0 + body.disc_radius)
-    return half * UP + rounding, np.column_stack([R, R @ middle]).ravel()
+    R = _frames(body)
+    local = body.vertices @ R
+    # |r - (r.a) a| for every box axis r; 1 - (r.a)^2 would cancel where they are parallel.
+    along = body.disc_axis @ R
+    across = R - body.disc_axis[:, None] * along[:, None, :]
+    reach = body.disc_radius * np.sqrt((across * across).sum(axis=1))
+    low, high = local.min(axis=1) - reach, local.max(axis=1) + reach
+    sides = high - low
+    best = int((sides + 1e-3 * sides.max(axis=1, keepdims=True)).prod(axis=1).argmin())
+    middle, half = 0.5 * (low[best] + high[best]), 0.5 * sides[best]
+    rounding = 32.0 * U * (np.abs(body.vertices).max() * 3.0 + body.disc_radius)
+    return half * UP + rounding, np.column_stack([R[best], R[best] @ middle]).ravel()
 
 
-def _frames(body: ConvexBody) -> list[np.ndarray]:
-    """Return candidate rotations, columns the axes: the frame, pairs of faces, inertia."""
-    frames = [np.eye(3)]
+def _frames(body: ConvexBody) -> np.ndarray:
+    """Return rotations to try, (m, 3, 3), columns the axes: the frame, pairs of faces, inertia."""
     normals = body.faces[:FACES_TRIED, :3]
-    for i, n in enumerate(normals):
-        for m in normals[i + 1 :]:
-            if abs(n @ m) < 1e-9:
-                frames.append(_orthonormal(n, m))
-                break
+    square = np.triu(np.abs(normals @ normals.T) < 1e-9, 1)
+    first = np.flatnonzero(square.any(axis=1))
+    x, y = normals[first], normals[square.argmax(axis=1)[first]]
     if len(body.vertices) > 3:
         _, _, vt = np.linalg.svd(body.vertices - body.vertices.mean(axis=0), full_matrices=False)
         if np.isfinite(vt).all():
-            frames.append(_orthonormal(vt[0], vt[1]))
-    return frames
+            x, y = np.concatenate([x, vt[:1]]), np.concatenate([y, vt[1:2]])
+    return np.concatenate([np.eye(3)[None], _orthonormal(x, y)])
 
 
 def _orthonormal(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the rotation with first axis x and second axis y made perpendicular to it."""
-    x = x / np.linalg.norm(x)
-    z = np.cross(x, y)
-    z /= np.linalg.norm(z)
-    return np.column_stack([x, np.cross(z, x), z])
+    """Return the rotations with first axis x and second axis y made perpendicular to it."""
+    x = x / np.linalg.norm(x, axis=1, keepdims=True)
+    z = _cross(x, y)
+    z /= np.linalg.norm(z, axis=1, keepdims=True)
+    return np.stack([x, _cross(z, x), z], axis=2)
+
+
+def _cross(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return the cross products of rows; numpy's own takes its time with few of them."""
+    a, b = [1, 2, 0], [2, 0, 1]
+    return x[:, a] * y[:, b] - x[:, b] * y[:, a]
