@@ -149,8 +149,10 @@ def _frames(body: ConvexBody) -> np.ndarray:
     """Return rotations to try, (m, 3, 3), columns the axes: the frame, pairs of faces, inertia."""
     normals = body.faces[:FACES_TRIED, :3]
     square = np.triu(np.abs(normals @ normals.T) < 1e-9, 1)
-    first = np.flatnonzero(square.any(axis=1))
-    x, y = normals[first], normals[square.argmax(axis=1)[first]]
+    first, second = np.nonzero(square)
+    # With each face the first one that is square to it.
+    first, once = np.unique(first, return_index=True)
+    x, y = normals[first], normals[second[once]]
     if len(body.vertices) > 3:
         _, _, vt = np.linalg.svd(body.vertices - body.vertices.mean(axis=0), full_matrices=False)
         if np.isfinite(vt).all():
