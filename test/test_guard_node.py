@@ -173,6 +173,18 @@ def test_certificate_is_that_of_the_library(
     assert json.loads(response.certificate)['verdict'] == 'collision'
 
 
+def test_scope_says_how_much_is_asked(guard: GuardProcess, ask: Asker) -> None:
+    whole = ask.result('arm', request(HIT))
+    first = ask.result('arm', request(HIT, scope=CertifyTrajectory.Request.FIRST))
+    assert first.intervals[0] == whole.intervals[0]
+    assert first.intervals[-1].reason == Reason.NOT_EXAMINED
+    quick = ask.result('arm', request(HIT, scope=CertifyTrajectory.Request.VERDICT))
+    assert quick.verdict is whole.verdict is Verdict.COLLISION
+    wrong = ask.result('arm', request(FREE, scope=3))
+    assert (wrong.verdict, wrong.reason_code) == (Verdict.REJECTED, Reason.INVALID_PARAMETER)
+    assert 'scope' in wrong.message
+
+
 def test_deadline_leaves_a_suspect(guard: GuardProcess, ask: Asker) -> None:
     result = ask.result('arm', request(back_and_forth(1000), deadline=Duration(nanosec=1)))
     assert result.verdict is not Verdict.FREE

@@ -12,7 +12,7 @@ from msg_adapters.trajectory import (
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.result import NANOSECONDS
 from trajectory_guard.ros.configuration import Configuration
-from trajectory_guard.settings import Settings
+from trajectory_guard.settings import Scope, Settings
 from trajectory_guard.trajectory import JointState, Trajectory
 
 # The seconds of a Duration are an int32, and the answer gives the times back as Durations.
@@ -95,6 +95,7 @@ def _settings(request: Any, joint_names: Sequence[str], configuration: Configura
             request.tracking_tolerance, least.tracking_tolerance
         ),
         deadline_ns=nanoseconds_from_message(request.deadline) or least.deadline_ns,
+        scope=_scope(request.scope),
         want_certificate=bool(request.want_certificate),
     )
     # Settings have refused what is negative or NaN by now.
@@ -113,6 +114,17 @@ def _settings(request: Any, joint_names: Sequence[str], configuration: Configura
                 'of the guard',
             )
     return asked
+
+
+def _scope(value: int) -> Scope:
+    """Return the scope of that number."""
+    try:
+        return Scope(value)
+    except ValueError:
+        raise RequestError(
+            Reason.INVALID_PARAMETER,
+            f'scope must be one of {", ".join(f"{s} ({s.name})" for s in Scope)}, got {value}',
+        ) from None
 
 
 def _tracking_tolerance(asked: Sequence[float], least: Sequence[float]) -> tuple[float, ...]:
