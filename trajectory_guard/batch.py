@@ -4,11 +4,14 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 import os
 
-from trajectory_guard.certify import judge
+from trajectory_guard.certify import judge_some
 from trajectory_guard.result import Result
 from trajectory_guard.settings import Settings
 from trajectory_guard.trajectory import JointState, Trajectory
 from trajectory_guard.workcell import Workcell
+
+# Trajectories that one call of the kernels takes.
+TOGETHER = 16
 
 
 def judge_all(
@@ -30,12 +33,16 @@ def judge_all(
     """
     states = starts if starts is not None else [None] * len(trajectories)
     jobs = list(zip(trajectories, states, strict=True))
+    # Each answer has a deadline of its own; without one a call of the kernels takes several, so
+    # that threads seldom wait for the interpreter.
+    size = TOGETHER if settings is None or settings.deadline_ns is None else 1
+    chunks = [jobs[i : i + size] for i in range(0, len(jobs), size)]
 
-    def one(job: tuple[Trajectory, JointState | None]) -> Result:
-        return judge(workcell, *job, settings)
+    def some(chunk: list[tuple[Trajectory, JointState | None]]) -> list[Result]:
+        return judge_some(workcell, chunk, settings)
 
-    workers = min(threads or os.cpu_count() or 1, len(jobs))
+    workers = min(threads or os.cpu_count() or 1, len(chunks))
     if workers <= 1:
-        return [one(job) for job in jobs]
+        return [result for chunk in chunks for result in some(chunk)]
     with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(one, jobs))
+        return [result for results in pool.map(some, chunks) for result in results]

@@ -2,8 +2,8 @@
 Certificates: what proves an answer, as a JSON object that anyone can check without the kernels.
 
 Times are exact dyadic parts of segments, numbers are the doubles that were compared. What the
-claims mean is said, and proved again, by ``trajectory_guard.verify``, which shares no code with what
-made them.
+claims mean is said, and proved again, by ``trajectory_guard.verify``, which shares no code with
+what made them.
 """
 
 import hashlib

@@ -12,7 +12,7 @@ from trajectory_guard.certificate import certificate
 from trajectory_guard.deadline import stop_flag
 from trajectory_guard.errors import Reason, TrajectoryGuardError
 from trajectory_guard.joint_path import INTERPOLATION, joint_path, JointPath
-from trajectory_guard.kernels.cover import cover, Covered
+from trajectory_guard.kernels.cover import cover_all, Covered, Question
 from trajectory_guard.kernels.layout import Path
 from trajectory_guard.request import check_joints, motion_path, tracking_slack
 from trajectory_guard.result import Interval, NANOSECONDS, Result, Status, Verdict
@@ -22,6 +22,16 @@ from trajectory_guard.trajectory import JointState, Trajectory
 from trajectory_guard.workcell import Pairs, Workcell
 
 _log = logging.getLogger(__name__)
+
+
+class _Job(NamedTuple):
+    """A path on its way to the kernels, and the time spent on it so far [s]."""
+
+    path: JointPath
+    slack: np.ndarray
+    motion: Path
+    pairs: Pairs
+    seconds: float
 
 
 class _Answer(NamedTuple):
@@ -50,57 +60,14 @@ def certify(
     :returns: intervals that partition [0, duration] and the verdict.
     :raises TrajectoryGuardError: the path does not fit the robot, or moves nothing that could hit.
     """
+    begin = time.perf_counter()
     settings = settings or Settings()
     check_joints(workcell.robot.movable, path)
     if slack is None:
         slack = tracking_slack(workcell.robot.movable, path, (), settings)
-    return _answer(workcell, path, settings, slack, time.perf_counter()).result
-
-
-def _answer(
-    workcell: Workcell, path: JointPath, settings: Settings, slack: np.ndarray, begin: float
-) -> _Answer:
-    pairs = workcell.pairs(path.in_path)
-    motion = motion_path(workcell, path, slack)
-    with stop_flag(settings.deadline_ns) as stop:
-        covered = cover(
-            workcell.packed,
-            motion,
-            pairs.moving,
-            settings.tolerance,
-            settings.clearance,
-            settings.max_pieces,
-            settings.scope,
-            settings.want_certificate,
-            stop,
-        )
-    leaves = with_witnesses(covered.leaves)
-    rows = intervals(
-        path.knots_ns,
-        leaves,
-        workcell.link_names,
-        workcell.obstacle_names,
-        path.unknown_until_ns,
-    )
-    verdict, reason, message = _verdict(rows)
-    result = Result(
-        verdict=verdict,
-        reason_code=reason,
-        message=message,
-        intervals=rows,
-        tolerance=settings.tolerance,
-        clearance=settings.clearance,
-        interpolation=INTERPOLATION,
-        robot_hash=workcell.robot_hash,
-        scene_hash=workcell.scene_hash,
-        compute_time=time.perf_counter() - begin,
-        pieces=covered.pieces,
-        pairs_checked=pairs.count,
-        unchecked_pairs=pairs.unchecked,
-        warnings=_warnings(workcell, motion, pairs, path),
-        duration_ns=path.duration_ns,
-    )
-    return _Answer(result, leaves, covered)
+    job = _job(workcell, path, slack, begin)
+    (covered,) = _cover(workcell, [job], settings)
+    return _answer(workcell, job, covered, settings).result
 
 
 def judge(
@@ -117,31 +84,150 @@ def judge(
     :param start: where the robot is at time 0.
     :param settings: what is asked; the defaults if None.
     """
+    (result,) = judge_some(workcell, [(trajectory, start)], settings)
+    return result
+
+
+def judge_some(
+    workcell: Workcell,
+    asked: Sequence[tuple[Trajectory, JointState | None]],
+    settings: Settings | None = None,
+) -> list[Result]:
+    """
+    Judge several trajectories with one call of the kernels; each has the answer of `judge`.
+
+    :param workcell: robot and scene.
+    :param asked: the messages, each with where the robot is at time 0.
+    :param settings: what is asked; the defaults if None. A deadline is one for all of them.
+    """
     settings = settings or Settings()
-    begin = time.perf_counter()
+    results: list[Result | None] = []
+    jobs: list[_Job] = []
+    for trajectory, start in asked:
+        try:
+            jobs.append(_job_of(workcell, trajectory, start, settings))
+            results.append(None)
+        except Exception as error:  # fail closed: no error may leave a request open
+            results.append(_rejected(error, settings, trajectory.name))
     try:
-        movable = workcell.robot.movable
-        path = joint_path(
-            movable,
-            trajectory,
-            start,
-            allowed_start_tolerance=settings.allowed_start_tolerance,
-            joint_limit_tolerance=settings.joint_limit_tolerance,
-            check_joint_limits=settings.check_joint_limits,
-            allow_nonzero_end_velocity=settings.allow_nonzero_end_velocity,
+        covered = iter(_cover(workcell, jobs, settings))
+    except Exception as error:  # fail closed
+        return [
+            result or _rejected(error, settings, trajectory.name)
+            for result, (trajectory, _) in zip(results, asked, strict=True)
+        ]
+    waiting = iter(jobs)
+    for i, (trajectory, start) in enumerate(asked):
+        if results[i] is None:
+            try:
+                results[i] = _result(
+                    workcell, trajectory, start, next(waiting), next(covered), settings
+                )
+            except Exception as error:  # fail closed
+                results[i] = _rejected(error, settings, trajectory.name)
+    return [result for result in results if result is not None]
+
+
+def _rejected(error: Exception, settings: Settings, name: str) -> Result:
+    """Return the answer to what went wrong."""
+    if isinstance(error, TrajectoryGuardError):
+        return Result.rejected(error, settings, name)
+    _log.error('certification of %r failed', name, exc_info=error)
+    internal = TrajectoryGuardError(Reason.INTERNAL_ERROR, f'internal error: {error!r}')
+    return Result.rejected(internal, settings, name)
+
+
+def _job_of(
+    workcell: Workcell, trajectory: Trajectory, start: JointState | None, settings: Settings
+) -> _Job:
+    """Return the curve of a trajectory, ready for the kernels."""
+    begin = time.perf_counter()
+    movable = workcell.robot.movable
+    path = joint_path(
+        movable,
+        trajectory,
+        start,
+        allowed_start_tolerance=settings.allowed_start_tolerance,
+        joint_limit_tolerance=settings.joint_limit_tolerance,
+        check_joint_limits=settings.check_joint_limits,
+        allow_nonzero_end_velocity=settings.allow_nonzero_end_velocity,
+    )
+    return _job(
+        workcell, path, tracking_slack(movable, path, trajectory.joint_names, settings), begin
+    )
+
+
+def _job(workcell: Workcell, path: JointPath, slack: np.ndarray, begin: float) -> _Job:
+    pairs = workcell.pairs(path.in_path)
+    motion = motion_path(workcell, path, slack)
+    return _Job(path, slack, motion, pairs, time.perf_counter() - begin)
+
+
+def _cover(workcell: Workcell, jobs: Sequence[_Job], settings: Settings) -> list[Covered]:
+    with stop_flag(settings.deadline_ns) as stop:
+        return cover_all(
+            workcell.packed,
+            [Question(job.motion, job.pairs.moving) for job in jobs],
+            settings.tolerance,
+            settings.clearance,
+            settings.max_pieces,
+            settings.scope,
+            settings.want_certificate,
+            stop,
         )
-        slack = tracking_slack(movable, path, trajectory.joint_names, settings)
-        answer = _answer(workcell, path, settings, slack, begin)
-        proof = None
-        if settings.want_certificate:
-            proof = certificate(workcell, trajectory, start, path, slack, *answer)
-    except TrajectoryGuardError as error:
-        return Result.rejected(error, settings, trajectory.name)
-    except Exception as error:  # fail closed: an unforeseen error must not leave a request open
-        _log.exception('certification of %r failed', trajectory.name)
-        internal = TrajectoryGuardError(Reason.INTERNAL_ERROR, f'internal error: {error!r}')
-        return Result.rejected(internal, settings, trajectory.name)
-    return dataclasses.replace(answer.result, name=trajectory.name, certificate=proof)
+
+
+def _result(
+    workcell: Workcell,
+    trajectory: Trajectory,
+    start: JointState | None,
+    job: _Job,
+    covered: Covered,
+    settings: Settings,
+) -> Result:
+    """Return the answer to a trajectory, with its certificate if one is wanted."""
+    answer = _answer(workcell, job, covered, settings, trajectory.name)
+    if not settings.want_certificate:
+        return answer.result
+    proof = certificate(workcell, trajectory, start, job.path, job.slack, *answer)
+    return dataclasses.replace(answer.result, certificate=proof)
+
+
+def _answer(
+    workcell: Workcell, job: _Job, covered: Covered, settings: Settings, name: str = ''
+) -> _Answer:
+    """Return the result of a path that was covered."""
+    begin = time.perf_counter()
+    path, pairs = job.path, job.pairs
+    leaves = with_witnesses(covered.leaves)
+    rows = intervals(
+        path.knots_ns,
+        leaves,
+        workcell.link_names,
+        workcell.obstacle_names,
+        path.unknown_until_ns,
+    )
+    verdict, reason, message = _verdict(rows)
+    warnings = _warnings(workcell, job.motion, pairs, path)
+    result = Result(
+        verdict=verdict,
+        reason_code=reason,
+        message=message,
+        intervals=rows,
+        tolerance=settings.tolerance,
+        clearance=settings.clearance,
+        interpolation=INTERPOLATION,
+        robot_hash=workcell.robot_hash,
+        scene_hash=workcell.scene_hash,
+        compute_time=job.seconds + covered.seconds + time.perf_counter() - begin,
+        pieces=covered.pieces,
+        pairs_checked=pairs.count,
+        unchecked_pairs=pairs.unchecked,
+        warnings=warnings,
+        duration_ns=path.duration_ns,
+        name=name,
+    )
+    return _Answer(result, leaves, covered)
 
 
 def _verdict(rows: Sequence[Interval]) -> tuple[Verdict, str, str]:

@@ -1,5 +1,6 @@
 """Cover a path, as Python calls it; see ``cover.hpp``."""
 
+from collections.abc import Sequence
 import ctypes
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ from trajectory_guard.kernels.layout import (
     Packed,
     Path,
     path_structure,
+    PathStructure,
     PIECE,
     Request,
 )
@@ -25,14 +27,28 @@ class Covered(NamedTuple):
 
     :param leaves: (L,) LEAF in time order.
     :param pieces: motion pieces examined.
+    :param seconds: wall-clock time in the kernels [s].
     :param entries: (E,) ENTRY, which inequality closed which pair; empty if not asked for.
     :param proved_on: (K,) PIECE that the entries speak of.
     """
 
     leaves: np.ndarray
     pieces: int
+    seconds: float
     entries: np.ndarray
     proved_on: np.ndarray
+
+
+class Question(NamedTuple):
+    """
+    One path to cover.
+
+    :param path: the joint path.
+    :param bodies: (M,) int64 bodies to check against every obstacle; each hangs on a node.
+    """
+
+    path: Path
+    bodies: np.ndarray
 
 
 def cover(
@@ -46,46 +62,77 @@ def cover(
     want_proof: bool,
     stop: np.ndarray,
 ) -> Covered:
+    """Cover all segments of one path; see :func:`cover_all`."""
+    (covered,) = cover_all(
+        packed,
+        [Question(path, bodies)],
+        tolerance,
+        clearance,
+        max_pieces,
+        scope,
+        want_proof,
+        stop,
+    )
+    return covered
+
+
+def cover_all(
+    packed: Packed,
+    questions: Sequence[Question],
+    tolerance: float,
+    clearance: float,
+    max_pieces: int,
+    scope: int,
+    want_proof: bool,
+    stop: np.ndarray,
+) -> list[Covered]:
     """
-    Cover all segments of a path.
+    Cover all segments of several paths in one call, without the interpreter's lock.
 
     :param packed: robot and scene.
-    :param path: the joint path.
-    :param bodies: (M,) int64 bodies to check against every obstacle; each hangs on a node.
+    :param questions: what to cover.
     :param tolerance: gaps above it must be decided [m].
     :param clearance: distance that must be exceeded [m].
-    :param max_pieces: pieces to examine before the rest is given up as suspect.
+    :param max_pieces: pieces of a path to examine before its rest is given up as suspect.
     :param scope: a `settings.Scope`.
     :param want_proof: whether to write down what closed each pair.
     :param stop: (1,) int64; another thread sets it non-zero to have the rest given up.
     :raises MemoryError: there is not enough.
     """
-    request = Request(
-        tolerance, clearance, max_pieces, scope, want_proof, address(bodies), len(bodies)
+    count = len(questions)
+    paths = (PathStructure * count)(*(path_structure(path) for path, _ in questions))
+    limits = (tolerance, clearance, max_pieces, scope, want_proof)
+    requests = (Request * count)(
+        *(Request(*limits, address(bodies), len(bodies)) for _, bodies in questions)
     )
-    answer = Answer()
+    answers = (Answer * count)()
     failed = library().guard_cover(
         ctypes.byref(packed.chain),
         ctypes.byref(packed.links),
         ctypes.byref(packed.obstacles),
         ctypes.byref(packed.boxes),
-        ctypes.byref(path_structure(path)),
         ctypes.byref(packed.extents),
-        ctypes.byref(request),
+        ctypes.c_int64(count),
+        paths,
+        requests,
         ctypes.c_void_p(address(stop)),
-        ctypes.byref(answer),
+        answers,
     )
     if failed:
         raise MemoryError('not enough memory to cover the path')
-    return Covered(
-        _copied(answer.leaves, answer.leaf_count, LEAF),
-        answer.pieces,
-        _copied(answer.entries, answer.entry_count, ENTRY),
-        _copied(answer.proved_on, answer.piece_count, PIECE),
-    )
+    return [
+        Covered(
+            _copied(answer.leaves, answer.leaf_count, LEAF),
+            answer.pieces,
+            answer.seconds,
+            _copied(answer.entries, answer.entry_count, ENTRY),
+            _copied(answer.proved_on, answer.piece_count, PIECE),
+        )
+        for answer in answers
+    ]
 
 
 def _copied(pointer: int | None, count: int, dtype: np.dtype) -> np.ndarray:
-    """Return a copy of what the kernels will overwrite with the next answer of this thread."""
+    """Return a copy of what the kernels will overwrite with the next answers of this thread."""
     data = ctypes.string_at(pointer, count * dtype.itemsize) if pointer and count else b''
     return np.frombuffer(data, dtype)

@@ -1,5 +1,7 @@
 // The functions that Python calls. Each returns 0, or 1 if memory ran out.
 #include <algorithm>
+#include <chrono>
+#include <deque>
 #include <new>
 
 #include "cover.hpp"
@@ -7,17 +9,20 @@
 
 namespace guard {
 
-// What a request is answered with; valid until the thread's next request.
+// What a request is answered with; valid until the thread's next requests.
 struct Answer {
   int64_t leaf_count, entry_count, piece_count, pieces;
+  double seconds;
   const Leaf* leaves;
   const Entry* entries;
   const Piece* proved_on;
 };
 
-static Work& room() {
-  static thread_local Work work;
-  return work;
+// Room for the requests of a thread; it stays from call to call.
+static std::deque<Work>& room(size_t count) {
+  static thread_local std::deque<Work> rooms;
+  if (rooms.size() < count) rooms.resize(count);
+  return rooms;
 }
 
 }  // namespace guard
@@ -26,17 +31,27 @@ using namespace guard;
 
 extern "C" {
 
-// Cover all segments of a path.
+// Cover all segments of each of `count` paths, one after the other.
 int guard_cover(const Chain* chain, const Solids* links, const Solids* obstacles,
-                const Boxes* boxes, const Path* path, const Extents* extents,
-                const Request* request, const int64_t* stop, Answer* answer) try {
-  Work& work = room();
-  Cover(*chain, *links, *obstacles, *boxes, *path, *extents, *request, stop, work).run();
-  const Proof& proof = work.proof;
-  *answer = {int64_t(work.leaves.size()),  int64_t(proof.entries.size()),
-             int64_t(proof.pieces.size()), work.pieces,
-             work.leaves.data(),           proof.entries.data(),
-             proof.pieces.data()};
+                const Boxes* boxes, const Extents* extents, int64_t count, const Path* paths,
+                const Request* requests, const int64_t* stop, Answer* answers) try {
+  using Clock = std::chrono::steady_clock;
+  std::deque<Work>& rooms = room(count);
+  for (int64_t i = 0; i < count; i++) {
+    Work& work = rooms[i];
+    Clock::time_point begin = Clock::now();
+    Cover(*chain, *links, *obstacles, *boxes, paths[i], *extents, requests[i], stop, work).run();
+    std::chrono::duration<double> spent = Clock::now() - begin;
+    const Proof& proof = work.proof;
+    answers[i] = {int64_t(work.leaves.size()),
+                  int64_t(proof.entries.size()),
+                  int64_t(proof.pieces.size()),
+                  work.pieces,
+                  spent.count(),
+                  work.leaves.data(),
+                  proof.entries.data(),
+                  proof.pieces.data()};
+  }
   return 0;
 } catch (const std::bad_alloc&) {
   return 1;

@@ -157,7 +157,7 @@ _Solids = _structure(
 _Boxes = _structure(
     'Boxes', blocks=_I, box=_P, obstacle=_P, nodes=_I, bounds=_P, branch=_P, far=_D
 )
-_Path = _structure('Path', segments=_I, coefficients=_P, rounding=_P, slack=_P, travel=_P)
+PathStructure = _structure('Path', segments=_I, coefficients=_P, rounding=_P, slack=_P, travel=_P)
 _Extents = _structure('Extents', extent=_P, perpendicular=_P, offsets=_P)
 Request = _structure(
     'Request',
@@ -175,6 +175,7 @@ Answer = _structure(
     entry_count=_I,
     piece_count=_I,
     pieces=_I,
+    seconds=_D,
     leaves=_P,
     entries=_P,
     proved_on=_P,
@@ -246,4 +247,4 @@ def _solids(solids: Solids) -> ctypes.Structure:
 
 def path_structure(path: Path) -> ctypes.Structure:
     """Return a path as the kernels take it; its arrays must outlive the structure."""
-    return _Path(len(path.coefficients), *(_checked(array, float) for array in path))
+    return PathStructure(len(path.coefficients), *(_checked(array, float) for array in path))

@@ -1,7 +1,10 @@
-"""A batch on one thread and on two."""
+"""A batch on one thread and on two, beside what two processes gain on this machine."""
 
 from collections.abc import Iterator
 import dataclasses
+import subprocess
+import sys
+import time
 
 from bench.cases import Bench, settings
 from bench.clock import interleaved
@@ -10,6 +13,8 @@ from trajectory_guard.result import Result
 
 SPEED_UP = 1.8
 THREADS = 2
+
+SPIN = 'sum(i * i for i in range(5_000_000))'
 
 # So often a batch has each trajectory, so that starting threads is a small part of it.
 REPEAT = 10
@@ -33,10 +38,25 @@ def threads(benches: list[Bench]) -> Iterator[dict]:
             'one_thread_s': best['1'][0],
             'two_threads_s': best['2'][0],
             'speed_up': speed_up,
+            'two_processes': machine(),
             'equal': equal,
             'target': f'speed_up >= {SPEED_UP}, equal',
             'met': equal and speed_up >= SPEED_UP,
         }
+
+
+def machine() -> float:
+    """Return how much faster two processes that share nothing are than one after the other."""
+    command = [sys.executable, '-c', SPIN]
+    alone, together = [], []
+    for _ in range(3):
+        for count, seconds in ((1, alone), (2, together)):
+            begin = time.perf_counter()
+            running = [subprocess.Popen(command) for _ in range(count)]
+            for process in running:
+                process.wait()
+            seconds.append(time.perf_counter() - begin)
+    return 2.0 * min(alone) / min(together)
 
 
 def timeless(result: Result) -> Result:
