@@ -13,8 +13,8 @@ from trajectory_guard.deadline import stop_flag
 from trajectory_guard.errors import Reason, TrajectoryGuardError
 from trajectory_guard.joint_path import INTERPOLATION, joint_path, JointPath
 from trajectory_guard.kernels.cover import cover_all, Covered, Question
-from trajectory_guard.kernels.layout import Path
-from trajectory_guard.request import check_joints, motion_path, tracking_slack
+from trajectory_guard.kernels.layout import KernelRefused, Path
+from trajectory_guard.request import check_joints, motion_path, refusal, tracking_slack
 from trajectory_guard.result import Interval, NANOSECONDS, Result, Status, Verdict
 from trajectory_guard.settings import Settings
 from trajectory_guard.timeline import intervals, with_witnesses
@@ -163,7 +163,7 @@ def _job(workcell: Workcell, path: JointPath, slack: np.ndarray, begin: float) -
     return _Job(path, slack, motion, pairs, time.perf_counter() - begin)
 
 
-def _cover(workcell: Workcell, jobs: Sequence[_Job], settings: Settings) -> list[Covered]:
+def _cover(workcell: Workcell, jobs: Sequence[_Job], settings: Settings) -> list[Covered | None]:
     with stop_flag(settings.deadline_ns) as stop:
         return cover_all(
             workcell.packed,
@@ -182,7 +182,7 @@ def _result(
     trajectory: Trajectory,
     start: JointState | None,
     job: _Job,
-    covered: Covered,
+    covered: Covered | None,
     settings: Settings,
 ) -> Result:
     """Return the answer to a trajectory, with its certificate if one is wanted."""
@@ -194,10 +194,12 @@ def _result(
 
 
 def _answer(
-    workcell: Workcell, job: _Job, covered: Covered, settings: Settings, name: str = ''
+    workcell: Workcell, job: _Job, covered: Covered | None, settings: Settings, name: str = ''
 ) -> _Answer:
-    """Return the result of a path that was covered."""
+    """Return the result of a covered path; raises what was wrong with a refused one."""
     begin = time.perf_counter()
+    if covered is None:
+        raise refusal(job.path, job.slack) or KernelRefused
     path, pairs = job.path, job.pairs
     leaves = with_witnesses(covered.leaves)
     rows = intervals(

@@ -10,7 +10,7 @@ from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.joint_path import JointPath
 from trajectory_guard.kernels import layout
 from trajectory_guard.kernels.link_motion import link_motion
-from trajectory_guard.request import check_joints, motion_path
+from trajectory_guard.request import check_joints, motion_path, refusal
 from trajectory_guard.workcell import Workcell
 
 
@@ -90,15 +90,14 @@ def rational_motion(
     if not (0 <= body < len(workcell.link_names) and workcell.link_nodes[body] >= 0):
         raise RequestError(Reason.INVALID_PARAMETER, f'body {body} hangs on no movable joint')
     check_joints(workcell.robot.movable, path)
-    matrices, weights, error, inflation, sweep, sound = link_motion(
-        workcell.packed,
-        motion_path(workcell, path, np.zeros(len(path.joint_names)) if slack is None else slack),
-        body,
-        segment,
-        numerator,
-        level,
-        int(builder),
-    )
+    slack = np.zeros(len(path.joint_names)) if slack is None else slack
+    motion = motion_path(workcell, path, slack)
+    try:
+        matrices, weights, error, inflation, sweep, sound = link_motion(
+            workcell.packed, motion, body, segment, numerator, level, int(builder)
+        )
+    except layout.KernelRefused as refused:
+        raise refusal(path, slack) or refused from refused
     if not (sound and math.isfinite(error)):
         raise RequestError(
             Reason.INVALID_PARAMETER, f'piece {numerator}/2^{level} turns too far for one motion'

@@ -6,7 +6,7 @@ import numpy as np
 
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.joint_path import JointPath
-from trajectory_guard.kernels.layout import Path, PRISMATIC, UP
+from trajectory_guard.kernels.layout import Path
 from trajectory_guard.robot import Joint
 from trajectory_guard.settings import Settings
 from trajectory_guard.workcell import Workcell
@@ -73,42 +73,47 @@ def tracking_slack(
 
 def motion_path(workcell: Workcell, path: JointPath, slack: np.ndarray) -> Path:
     """
-    Return a path as kernel arrays, with how far its prismatic joints slide.
+    Return a path as kernel arrays.
+
+    Kernels take shapes on trust, so they are checked here; what the numbers must be the kernels
+    check themselves, and `refusal` says what was wrong with them.
 
     :param workcell: robot and scene.
     :param path: the motion of every movable joint of that robot.
     :param slack: (n,) tracking tolerance per movable joint [rad or m].
-    :raises RequestError: the path leaves the range of the kernels.
+    :raises RequestError: the tolerance has another shape or type.
     """
-    _check_slack(slack, len(path.joint_names))
-    if not (path.coefficient_error >= 0.0).all():
-        raise RequestError(
-            Reason.INVALID_PARAMETER, 'coefficient_error must be >= 0 and not NaN everywhere'
-        )
-    size = np.abs(path.coefficients).sum(axis=2).max(axis=0) + path.coefficient_error.max(axis=0)
-    if not (size <= LARGEST).all():
-        worst = int(np.argmax(~(size <= LARGEST)))
-        raise RequestError(
-            Reason.TOO_LARGE,
-            f'joint {path.joint_names[worst]!r} moves by {size[worst]:g}, more than {LARGEST:g}',
-        )
-    sliding = workcell.tree.chain.kind == PRISMATIC
-    return Path(
-        coefficients=path.coefficients,
-        rounding=path.coefficient_error,
-        slack=slack,
-        travel=np.where(sliding, (size + slack) * UP, 0.0),
-    )
-
-
-def _check_slack(slack: np.ndarray, joints: int) -> None:
-    """Refuse a tracking tolerance that kernels would read out of bounds or that would deflate."""
+    joints = len(workcell.robot.movable)
     if slack.shape != (joints,) or slack.dtype != np.float64 or not slack.flags.c_contiguous:
         raise RequestError(
             Reason.INVALID_TRACKING_TOLERANCE,
             f'slack must be {joints} doubles, got {slack.dtype} of shape {slack.shape}',
         )
+    return Path(path.coefficients, path.coefficient_error, slack)
+
+
+def refusal(path: JointPath, slack: np.ndarray) -> RequestError | None:
+    """
+    Say why the kernels do not take a path; None if they should.
+
+    :param path: the joint path.
+    :param slack: (n,) tracking tolerance per movable joint [rad or m].
+    """
     if not ((slack >= 0.0) & (slack <= LARGEST)).all():
-        raise RequestError(
+        return RequestError(
             Reason.INVALID_TRACKING_TOLERANCE, f'slack must lie in [0, {LARGEST:g}], got {slack}'
         )
+    if not (path.coefficient_error >= 0.0).all():
+        return RequestError(
+            Reason.INVALID_PARAMETER, 'coefficient_error must be >= 0 and not NaN everywhere'
+        )
+    size = (np.abs(path.coefficients).sum(axis=2) + path.coefficient_error).max(axis=0)
+    # A sum in another order may round to the other side of the limit.
+    fits = size <= LARGEST * (1.0 - 2.0**-40)
+    if fits.all():
+        return None
+    worst = int(np.argmin(fits))
+    return RequestError(
+        Reason.TOO_LARGE,
+        f'joint {path.joint_names[worst]!r} moves by {size[worst]:g}, more than {LARGEST:g}',
+    )

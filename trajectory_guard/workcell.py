@@ -163,8 +163,7 @@ class Workcell:
 
 def _standing(joints: int) -> Path:
     """Return a path on which nothing moves."""
-    none = np.zeros(joints)
-    return Path(np.zeros((1, joints, 6)), np.zeros((1, joints)), none, none)
+    return Path(np.zeros((1, joints, 6)), np.zeros((1, joints)), np.zeros(joints))
 
 
 def _product(bodies: np.ndarray, obstacles: int) -> np.ndarray:

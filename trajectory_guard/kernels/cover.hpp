@@ -101,19 +101,22 @@ class Cover {
         motion{chain,      links,       path,     (chain.nodes + LANES - 1) / LANES * LANES,
                work.nodes, work.bodies, work.rho, work.chord,
                work.span,  work.fuzz,   work.fit} {
-    motion.begin(extents, request.bodies, request.body_count);
+    usable = motion.begin(extents, request.bodies, request.body_count);
     work.leaves.clear();
     work.live.clear();
     work.proof.clear(request.want_proof != 0);
     work.pieces = 0;
   }
 
-  void run() {
+  // False if the path is not what kernels can take; nothing is said of it then.
+  bool run() {
+    if (!usable) return false;
     if (request.scope == SCOPE_VERDICT)
       breadth_first();
     else
       depth_first();
     if (!work.proof.wanted) condense();
+    return true;
   }
 
  private:
@@ -123,6 +126,7 @@ class Cover {
   Work& work;
   Question ask;
   Motion motion;
+  bool usable;
   int64_t given_up = -1;
   bool crowded = false;  // the last piece had too many pairs to open
 

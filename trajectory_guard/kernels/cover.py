@@ -10,7 +10,9 @@ from trajectory_guard.kernels.compiled import library
 from trajectory_guard.kernels.layout import (
     address,
     Answer,
+    check,
     ENTRY,
+    KernelRefused,
     LEAF,
     Packed,
     Path,
@@ -62,7 +64,11 @@ def cover(
     want_proof: bool,
     stop: np.ndarray,
 ) -> Covered:
-    """Cover all segments of one path; see :func:`cover_all`."""
+    """
+    Cover all segments of one path; see :func:`cover_all`.
+
+    :raises KernelRefused: the path is out of range.
+    """
     (covered,) = cover_all(
         packed,
         [Question(path, bodies)],
@@ -73,6 +79,8 @@ def cover(
         want_proof,
         stop,
     )
+    if covered is None:
+        raise KernelRefused
     return covered
 
 
@@ -85,7 +93,7 @@ def cover_all(
     scope: int,
     want_proof: bool,
     stop: np.ndarray,
-) -> list[Covered]:
+) -> list[Covered | None]:
     """
     Cover all segments of several paths in one call, without the interpreter's lock.
 
@@ -97,6 +105,7 @@ def cover_all(
     :param scope: a `settings.Scope`.
     :param want_proof: whether to write down what closed each pair.
     :param stop: (1,) int64; another thread sets it non-zero to have the rest given up.
+    :returns: what was found of each path; None if it is out of range.
     :raises MemoryError: there is not enough.
     """
     count = len(questions)
@@ -106,7 +115,7 @@ def cover_all(
         *(Request(*limits, address(bodies), len(bodies)) for _, bodies in questions)
     )
     answers = (Answer * count)()
-    failed = library().guard_cover(
+    status = library().guard_cover(
         ctypes.byref(packed.chain),
         ctypes.byref(packed.links),
         ctypes.byref(packed.obstacles),
@@ -118,10 +127,11 @@ def cover_all(
         ctypes.c_void_p(address(stop)),
         answers,
     )
-    if failed:
-        raise MemoryError('not enough memory to cover the path')
+    check(status)
     return [
-        Covered(
+        None
+        if answer.leaf_count < 0
+        else Covered(
             _copied(answer.leaves, answer.leaf_count, LEAF),
             answer.pieces,
             answer.seconds,

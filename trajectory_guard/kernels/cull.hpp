@@ -24,7 +24,8 @@ inline double taken(const Solids& links, int64_t b, const Solids& obstacles, int
 inline bool swept_clear(const Solids& links, int64_t b, const Solids& obstacles, int64_t o,
                         double clearance, Body& body) {
   double distance = box_distance(body.place, obstacles, o);
-  if (distance > (taken(links, b, obstacles, o, clearance, body) + body.sweep + body.fuzz) * UP)
+  if (distance > (taken(links, b, obstacles, o, clearance, body) + body.sweep + body.fuzz) * UP &&
+      distance < INFINITY)
     return true;
   double gap = distance - obstacles.length(o, BALL);
   if (gap < body.nearest) body.nearest = gap;
@@ -47,7 +48,8 @@ inline bool moving_clear(Motion& motion, int64_t b, const Solids& obstacles, int
   double needed =
       taken(motion.links, b, obstacles, o, clearance, body) + body.radius + body.error +
       chain_margin(motion.chain.depth[node], motion.nodes[node].growth.kappa, body.reach);
-  return box_distance(body.place, obstacles, o) > needed * UP;
+  double distance = box_distance(body.place, obstacles, o);
+  return distance > needed * UP && distance < INFINITY;
 }
 
 // Call `open(o)` for every obstacle that the swept sphere does not keep clear of.
@@ -70,7 +72,7 @@ inline void scan(const Solids& links, int64_t b, const Boxes& boxes, double clea
       double outside = below > above ? below : above;
       if (outside > 0.0) apart += outside * outside;
     }
-    if (apart > square) continue;
+    if (apart > square && apart < INFINITY) continue;
     const int64_t* branch = boxes.branch + 2 * node;
     if (branch[0] >= 0) {
       stack[height++] = branch[1];
@@ -89,7 +91,7 @@ inline void scan(const Solids& links, int64_t b, const Boxes& boxes, double clea
     }
     Lanes needed =
         (base + row(BOX_BALL) + SPHERE * UNIT_ROUNDOFF * (body.reach + row(BOX_FAR))) * UP;
-    Mask clear = total > needed * needed * UP;
+    Mask clear = (total > needed * needed * UP) & (total < INFINITY);
     const int64_t* obstacle = boxes.obstacle + branch[1] * LANES;
     for (int i = 0; i < LANES; i++)
       if (obstacle[i] >= 0 && !clear[i]) {

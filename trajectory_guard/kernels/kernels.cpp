@@ -1,4 +1,5 @@
-// The functions that Python calls. Each returns 0, or 1 if memory ran out.
+// The functions that Python calls. Each returns 0, 1 if memory ran out, or 2 if the path is not what
+// kernels can take.
 #include <algorithm>
 #include <chrono>
 #include <deque>
@@ -9,7 +10,8 @@
 
 namespace guard {
 
-// What a request is answered with; valid until the thread's next requests.
+// What a request is answered with; valid until the thread's next requests. No leaves are -1: the
+// path is not what kernels can take.
 struct Answer {
   int64_t leaf_count, entry_count, piece_count, pieces;
   double seconds;
@@ -40,10 +42,11 @@ int guard_cover(const Chain* chain, const Solids* links, const Solids* obstacles
   for (int64_t i = 0; i < count; i++) {
     Work& work = rooms[i];
     Clock::time_point begin = Clock::now();
-    Cover(*chain, *links, *obstacles, *boxes, paths[i], *extents, requests[i], stop, work).run();
+    Cover cover(*chain, *links, *obstacles, *boxes, paths[i], *extents, requests[i], stop, work);
+    bool taken = cover.run();
     std::chrono::duration<double> spent = Clock::now() - begin;
     const Proof& proof = work.proof;
-    answers[i] = {int64_t(work.leaves.size()),
+    answers[i] = {taken ? int64_t(work.leaves.size()) : -1,
                   int64_t(proof.entries.size()),
                   int64_t(proof.pieces.size()),
                   work.pieces,
@@ -68,7 +71,7 @@ int guard_link_motion(const Chain* chain, const Solids* links, const Path* path,
   Motion motion{*chain,     *links,      *path,    (chain->nodes + LANES - 1) / LANES * LANES,
                 work.nodes, work.bodies, work.rho, work.chord,
                 work.span,  work.fuzz,   work.fit};
-  motion.begin(*extents, &body, 1);
+  if (!motion.begin(*extents, &body, 1)) return 2;
   motion.need_none();
   motion.need(body);
   motion.centre(*piece);

@@ -124,13 +124,11 @@ class Path(NamedTuple):
     :param coefficients: (S, n, 6) powers of s on [0, 1] of each segment [rad or m].
     :param rounding: (S, n) bound on the error of the coefficients together [rad or m].
     :param slack: (n,) tracking tolerance [rad or m].
-    :param travel: (n,) bound on |q| of a slide over path and tolerance, else zero [m].
     """
 
     coefficients: np.ndarray
     rounding: np.ndarray
     slack: np.ndarray
-    travel: np.ndarray
 
 
 _P = ctypes.c_void_p
@@ -157,7 +155,7 @@ _Solids = _structure(
 _Boxes = _structure(
     'Boxes', blocks=_I, box=_P, obstacle=_P, nodes=_I, bounds=_P, branch=_P, far=_D
 )
-PathStructure = _structure('Path', segments=_I, coefficients=_P, rounding=_P, slack=_P, travel=_P)
+PathStructure = _structure('Path', segments=_I, coefficients=_P, rounding=_P, slack=_P)
 _Extents = _structure('Extents', extent=_P, perpendicular=_P, offsets=_P)
 Request = _structure(
     'Request',
@@ -245,6 +243,32 @@ def _solids(solids: Solids) -> ctypes.Structure:
     )
 
 
+class KernelRefused(ValueError):
+    """A path has a number that kernels cannot take; who made it can say which."""
+
+    def __init__(self) -> None:
+        super().__init__('a path is not finite, negative where it must not be, or too large')
+
+
+def check(status: int) -> None:
+    """
+    Raise what a kernel's status says.
+
+    :param status: 0: it did what was asked.
+    :raises MemoryError: there is not enough.
+    :raises KernelRefused: a path is out of range.
+    """
+    if status == 2:
+        raise KernelRefused
+    if status:
+        raise MemoryError('not enough memory for the kernels')
+
+
 def path_structure(path: Path) -> ctypes.Structure:
     """Return a path as the kernels take it; its arrays must outlive the structure."""
-    return PathStructure(len(path.coefficients), *(_checked(array, float) for array in path))
+    return PathStructure(
+        len(path.coefficients),
+        _checked(path.coefficients, float),
+        _checked(path.rounding, float),
+        _checked(path.slack, float),
+    )

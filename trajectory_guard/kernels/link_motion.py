@@ -5,7 +5,15 @@ import ctypes
 import numpy as np
 
 from trajectory_guard.kernels.compiled import library
-from trajectory_guard.kernels.layout import address, Packed, Path, path_structure, Piece, RATIONAL
+from trajectory_guard.kernels.layout import (
+    address,
+    check,
+    Packed,
+    Path,
+    path_structure,
+    Piece,
+    RATIONAL,
+)
 
 _FIT_DEGREE = 6  # of a joint's rational motion
 _CONTROLS = 13  # of an economised motion
@@ -31,7 +39,7 @@ def link_motion(
     weights = np.empty(most)
     lengths = np.zeros(4)
     count = ctypes.c_int64()
-    failed = library().guard_link_motion(
+    status = library().guard_link_motion(
         ctypes.byref(packed.chain),
         ctypes.byref(packed.links),
         ctypes.byref(path_structure(path)),
@@ -45,8 +53,7 @@ def link_motion(
         ctypes.c_void_p(address(lengths)),
         ctypes.byref(count),
     )
-    if failed:
-        raise MemoryError('not enough memory for the motion of a link')
+    check(status)
     error, slack, sweep, sound = lengths.tolist()
     k = count.value
     return matrices[:k].copy(), weights[:k].copy(), error, slack, sweep, bool(sound)

@@ -52,8 +52,13 @@ struct Motion {
 
   const double* arms(int64_t b) const { return rho.data() + b * padded; }
 
-  // Prepare the bodies of a request.
-  void begin(const Extents& extents, const int64_t* moved, int64_t count) {
+  // Prepare the bodies of a request; false if the path is not what kernels can take.
+  bool begin(const Extents& extents, const int64_t* moved, int64_t count) {
+    std::vector<double> travel(chain.nodes);
+    for (int64_t j = 0; j < chain.nodes; j++) {
+      travel[j] = (size_of(path, chain.nodes, j) + path.slack[j]) * UP;
+      if (!(travel[j] >= 0.0)) return false;
+    }
     nodes.resize(chain.nodes);
     bodies.resize(links.count);
     rho.assign(links.count * padded, 0.0);
@@ -62,12 +67,13 @@ struct Motion {
       int64_t b = moved[i];
       Body& body = bodies[b];
       double* arm = rho.data() + b * padded;
-      body.reach = lever_arms(chain, path, extents, b, links.range(b, NODE), arm);
+      body.reach = lever_arms(chain, travel.data(), extents, b, links.range(b, NODE), arm);
       body.slack = 0.0;
       body.stands_on = -1;
       for (int64_t j = 0; j < chain.nodes; j++) body.slack += chorded(j, path.slack[j]) * arm[j];
       body.slack *= UP;
     }
+    return true;
   }
 
   double chorded(int64_t j, double turn) const {

@@ -19,16 +19,17 @@
 namespace guard {
 
 // Write the lever arms of a body on all n joints (zero where the joint is not above it) [m, or 1
-// for a slide]; returns a bound on every length that enters the body's position [m].
-inline double lever_arms(const Chain& chain, const Path& path, const Extents& extents, int64_t b,
-                         int64_t node, double* rho) {
+// for a slide]; returns a bound on every length that enters the body's position [m]. travel: (n,)
+// bound on |q| of a slide, tolerance included [m].
+inline double lever_arms(const Chain& chain, const double* travel, const Extents& extents,
+                         int64_t b, int64_t node, double* rho) {
   // `far`: bound on the distance of the body's points to the origin of the node below j, `axis`:
   // the same to the axis of j.
   double far = extents.extent[b], axis = extents.perpendicular[b];
   for (int64_t j = node; j >= 0; j = chain.parent[j]) {
     if (chain.kind[j] == PRISMATIC) {
       rho[j] = 1.0;
-      far += path.travel[j];
+      far += travel[j];
     } else {
       rho[j] = axis * UP;
     }

@@ -100,7 +100,7 @@ inline double lowest(const Gradients& g, const Solids& links, int64_t b, double 
   int first = 0;
   double bottom = INFINITY;
   for (int i = 0; i < g.count; i++) {
-    if (below[i] != below[i]) return NAN;
+    if (!(std::fabs(below[i]) < INFINITY)) return NAN;
     if (below[i] < bottom) {
       bottom = below[i];
       first = i;
@@ -201,7 +201,8 @@ inline bool turning(const Turn& turn, const Controls& points, const Solids& link
     }
     for (int j = 0; j <= TURN; j++) g.row[3][i] -= SHARES.row[from][j] * high[j];
   }
-  return lowest(g, links, b, need) > need;
+  double low = lowest(g, links, b, need);
+  return low > need && low < INFINITY;
 }
 
 // The distance of a point in the root frame to the oriented box of a solid, zero inside [m];

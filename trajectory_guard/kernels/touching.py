@@ -5,7 +5,7 @@ import ctypes
 import numpy as np
 
 from trajectory_guard.kernels.compiled import library
-from trajectory_guard.kernels.layout import address, Packed, Path, path_structure
+from trajectory_guard.kernels.layout import address, check, Packed, Path, path_structure
 
 
 def touching(packed: Packed, path: Path, pairs: np.ndarray) -> np.ndarray:
@@ -19,7 +19,7 @@ def touching(packed: Packed, path: Path, pairs: np.ndarray) -> np.ndarray:
     :raises MemoryError: there is not enough.
     """
     touch = np.zeros(len(pairs), np.bool_)
-    failed = library().guard_touching(
+    status = library().guard_touching(
         ctypes.byref(packed.chain),
         ctypes.byref(packed.links),
         ctypes.byref(packed.obstacles),
@@ -28,6 +28,5 @@ def touching(packed: Packed, path: Path, pairs: np.ndarray) -> np.ndarray:
         ctypes.c_int64(len(pairs)),
         ctypes.c_void_p(address(touch)),
     )
-    if failed:
-        raise MemoryError('not enough memory to look at what stands')
+    check(status)
     return touch

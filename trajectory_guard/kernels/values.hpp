@@ -1,6 +1,7 @@
 // What the core hands to the kernels: plain structures of read-only arrays, checked by the core.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include "vector.hpp"
@@ -66,8 +67,24 @@ struct Path {
   const double* coefficients;  // (S, n, TERMS) powers of s on [0, 1] [rad or m]
   const double* rounding;      // (S, n) bound on the error of the coefficients together
   const double* slack;         // (n,) tracking tolerance [rad or m]
-  const double* travel;        // (n,) bound on |q| of a slide, tolerance included [m]
 };
+
+// No coordinate is larger, so that no product overflows [rad or m].
+constexpr double LARGEST = 1e9;
+
+// Bound |q| of a joint over the path; NaN if the path is not what kernels can take.
+inline double size_of(const Path& path, int64_t nodes, int64_t j) {
+  double most = 0.0;
+  for (int64_t segment = 0; segment < path.segments; segment++) {
+    int64_t row = segment * nodes + j;
+    double size = path.rounding[row];
+    if (!(size >= 0.0)) return NAN;
+    for (int k = 0; k < TERMS; k++) size += std::fabs(path.coefficients[row * TERMS + k]);
+    if (!(size <= LARGEST)) return NAN;
+    if (size > most) most = size;
+  }
+  return path.slack[j] >= 0.0 && path.slack[j] <= LARGEST ? most : NAN;
+}
 
 // How far each body reaches.
 struct Extents {

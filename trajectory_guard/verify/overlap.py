@@ -52,12 +52,12 @@ class Collision(NamedTuple):
         )
 
     def _chords(self, body: Moved) -> Iterator[tuple[Vector, Vector]]:
-        """Yield the chord of the point's curve, its place at the middle, and inherited ones."""
+        """Yield the chord of the point's curve, places of it that stand still, inherited ones."""
         middle = lerp(self.first, self.last, fmpq(1, 2))
         a, m, b = (
             [arb(x) for x in body.place(tau, [float(x.mid()) for x in point])]
             for tau, point in ((-1, self.first), (0, middle), (1, self.last))
         )
         yield a, b
-        yield m, m
+        yield from ((z, z) for z in (m, a, b))
         yield from self.chords
