@@ -261,7 +261,7 @@ class Cover {
       int64_t b = request.bodies[i];
       Body& body = motion.stand(b, examined);
       scan(motion.links, b, ask.boxes, request.clearance, body,
-           [&](int64_t o) { work.live.push_back({b, o, {}, {}, {}, {}}); });
+           [&](int64_t o) { work.live.push_back({b, o, {}, {}, {}, {}, {}}); });
       wide =
           wide || body.sweep > WIDE * (motion.links.length(b, CORE) + motion.links.length(b, BALL));
       if (wide && int64_t(work.live.size()) - first > CROWD && piece.level < DEEPEST_LEVEL) {

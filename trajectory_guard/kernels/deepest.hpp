@@ -70,11 +70,86 @@ struct Common {
   double mine, theirs;  // its depth in the link and in the obstacle [m]
 };
 
+// The four faces that met at an optimum; they are often the same an instant later.
+struct Meeting {
+  int64_t face[4];
+  bool own[4];  // of the link, else of the obstacle
+  bool known;
+};
+
+// A basis of the dual simplex: rows (n, 1) and values d of four faces, the inverse of the rows, the
+// multipliers.
+struct Basis4 {
+  double row[4][4], value[4], inverse[4][4], weight[4];
+  Meeting at;
+
+  void put(int k, const Faces& faces, int64_t f, bool own) {
+    row[k][0] = faces.x[f];
+    row[k][1] = faces.y[f];
+    row[k][2] = faces.z[f];
+    row[k][3] = 1.0;
+    value[k] = faces.d[f];
+    at.face[k] = f;
+    at.own[k] = own;
+  }
+
+  // A regular tetrahedron around a solid, multipliers 1/4 each. The rows (n, 1), n corners of a cube
+  // over sqrt(3), are orthogonal: their inverse is known.
+  void surround(const double* centre, double radius) {
+    static const double CORNER[4][3] = {{1, 1, 1}, {-1, -1, 1}, {-1, 1, -1}, {1, -1, -1}};
+    for (int k = 0; k < 4; k++) {
+      value[k] = 4.0 * radius;
+      for (int r = 0; r < 3; r++) {
+        row[k][r] = CORNER[k][r] / std::sqrt(3.0);
+        value[k] += row[k][r] * centre[r];
+        inverse[r][k] = 0.75 * row[k][r];
+      }
+      row[k][3] = 1.0;
+      inverse[3][k] = weight[k] = 0.25;
+      at.face[k] = -1;
+      at.own[k] = false;
+    }
+  }
+
+  // Start where four faces met before; false if their multipliers are no longer positive.
+  bool meet_again(const Meeting& before, const Faces& mine, const Faces& theirs) {
+    if (!before.known) return false;
+    for (int k = 0; k < 4; k++)
+      put(k, before.own[k] ? mine : theirs, before.face[k], before.own[k]);
+    double u[3][3], c[3][3], det = 0.0;
+    for (int k = 0; k < 3; k++)
+      for (int r = 0; r < 3; r++) u[k][r] = row[k][r] - row[3][r];
+    for (int k = 0; k < 3; k++) {
+      const double *p = u[(k + 1) % 3], *q = u[(k + 2) % 3];
+      for (int r = 0; r < 3; r++)
+        c[k][r] = p[(r + 1) % 3] * q[(r + 2) % 3] - p[(r + 2) % 3] * q[(r + 1) % 3];
+    }
+    for (int r = 0; r < 3; r++) det += u[0][r] * c[0][r];
+    if (!(std::fabs(det) > 1e-9)) return false;
+    for (int r = 0; r < 4; r++) inverse[r][3] = r == 3 ? 1.0 : 0.0;
+    for (int k = 0; k < 3; k++) {
+      inverse[3][k] = 0.0;
+      for (int r = 0; r < 3; r++) {
+        inverse[r][k] = c[k][r] / det;
+        inverse[r][3] -= inverse[r][k];
+        inverse[3][k] -= row[3][r] * inverse[r][k];
+      }
+      inverse[3][3] -= inverse[3][k];
+    }
+    for (int k = 0; k < 4; k++) {
+      weight[k] = inverse[3][k];
+      if (!(weight[k] > 1e-9)) return false;
+    }
+    return true;
+  }
+};
+
 // Propose a point deep inside a link and an obstacle at one pose; true if it is inside both.
 //
-// moved: scratch for the obstacle's faces in the node frame.
+// moved: scratch for the obstacle's faces in the node frame. meeting: where to start, and where it
+// ended.
 inline bool deepest(const double* pose, const Solids& links, int64_t b, const Solids& obstacles,
-                    int64_t o, std::vector<double>& moved, Common& out) {
+                    int64_t o, std::vector<double>& moved, Meeting& meeting, Common& out) {
   Faces mine = faces_of(links, b), world = faces_of(obstacles, o);
   for (int r = 0; r < 3; r++) out.point[r] = out.direction[r] = 0.0;
   if (mine.count == 0 || world.count == 0) return false;
@@ -89,61 +164,46 @@ inline bool deepest(const double* pose, const Solids& links, int64_t b, const So
           load(world.d + f) - (x * pose[12] + y * pose[13] + z * pose[14]));
   }
   double radius = links.length(b, CORE) + links.length(b, BALL);
-  const double* c = links.at(b, CENTRE);
-  // A regular tetrahedron around the solid, multipliers 1/4 each. The rows (n, 1), n corners of a
-  // cube over sqrt(3), are orthogonal: their inverse is known.
-  static const double CORNER[4][3] = {{1, 1, 1}, {-1, -1, 1}, {-1, 1, -1}, {1, -1, -1}};
-  double basis[4][4], value[4], inverse[4][4], weight[4], shares[4];
-  bool own[4] = {false, false, false, false};
-  for (int k = 0; k < 4; k++) {
-    value[k] = 4.0 * radius;
-    for (int r = 0; r < 3; r++) {
-      basis[k][r] = CORNER[k][r] / std::sqrt(3.0);
-      value[k] += basis[k][r] * c[r];
-      inverse[r][k] = 0.75 * basis[k][r];
-    }
-    basis[k][3] = 1.0;
-    inverse[3][k] = 0.25;
-    weight[k] = 0.25;
-  }
+  Basis4 basis;
+  if (!basis.meet_again(meeting, mine, theirs)) basis.surround(links.at(b, CENTRE), radius);
   double x[4] = {0.0, 0.0, 0.0, 0.0};
   for (int pivot = 0; pivot < PIVOTS; pivot++) {
     for (int r = 0; r < 4; r++)
-      x[r] = inverse[r][0] * value[0] + inverse[r][1] * value[1] + inverse[r][2] * value[2] +
-             inverse[r][3] * value[3];
+      x[r] = basis.inverse[r][0] * basis.value[0] + basis.inverse[r][1] * basis.value[1] +
+             basis.inverse[r][2] * basis.value[2] + basis.inverse[r][3] * basis.value[3];
     double worst = 1e-12 * radius;
     int64_t f = 0;
     bool any_mine = most_violated(mine, x, x[3], worst, f);
     bool any_theirs = most_violated(theirs, x, x[3], worst, f);
     if (!(any_mine || any_theirs) || !(x[3] > 0.0)) break;
     const Faces& from = any_theirs ? theirs : mine;
-    double a[4] = {from.x[f], from.y[f], from.z[f], 1.0};
+    double shares[4], ratio = INFINITY;
     int leave = -1;
-    double ratio = INFINITY;
     for (int k = 0; k < 4; k++) {
-      shares[k] =
-          a[0] * inverse[0][k] + a[1] * inverse[1][k] + a[2] * inverse[2][k] + inverse[3][k];
-      if (shares[k] > 1e-12 && weight[k] / shares[k] < ratio) {
-        ratio = weight[k] / shares[k];
+      shares[k] = from.x[f] * basis.inverse[0][k] + from.y[f] * basis.inverse[1][k] +
+                  from.z[f] * basis.inverse[2][k] + basis.inverse[3][k];
+      if (shares[k] > 1e-12 && basis.weight[k] / shares[k] < ratio) {
+        ratio = basis.weight[k] / shares[k];
         leave = k;
       }
     }
     if (leave < 0) break;
-    for (int k = 0; k < 4; k++) weight[k] -= ratio * shares[k];
-    weight[leave] = ratio;
-    for (int r = 0; r < 4; r++) inverse[r][leave] /= shares[leave];
+    for (int k = 0; k < 4; k++) basis.weight[k] -= ratio * shares[k];
+    basis.weight[leave] = ratio;
+    for (int r = 0; r < 4; r++) basis.inverse[r][leave] /= shares[leave];
     for (int k = 0; k < 4; k++)
       if (k != leave)
-        for (int r = 0; r < 4; r++) inverse[r][k] -= shares[k] * inverse[r][leave];
-    for (int r = 0; r < 4; r++) basis[leave][r] = a[r];
-    value[leave] = from.d[f];
-    own[leave] = !any_theirs;
+        for (int r = 0; r < 4; r++) basis.inverse[r][k] -= shares[k] * basis.inverse[r][leave];
+    basis.put(leave, from, f, !any_theirs);
   }
+  meeting = basis.at;
+  meeting.known = true;
+  for (int64_t f : meeting.face) meeting.known = meeting.known && f >= 0;
   for (int r = 0; r < 3; r++) out.point[r] = x[r];
   double g[3] = {0.0, 0.0, 0.0}, n[3];
   for (int k = 0; k < 4; k++)
-    if (own[k])
-      for (int r = 0; r < 3; r++) g[r] -= weight[k] * basis[k][r];
+    if (basis.at.own[k])
+      for (int r = 0; r < 3; r++) g[r] -= basis.weight[k] * basis.row[k][r];
   for (int r = 0; r < 3; r++) n[r] = pose[r] * g[0] + pose[4 + r] * g[1] + pose[8 + r] * g[2];
   double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
   if (length > 1e-9)

@@ -27,6 +27,7 @@ struct Live {
   int64_t body, obstacle;
   double n[3];  // the best direction so far, zero if there is none
   Instant start, centre, end;
+  Meeting meeting;  // of the faces around the last common point
 
   // The same for a half of the piece.
   Live half(bool second) const {
@@ -136,7 +137,7 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
   bool deep = false;
   auto stands = [&] {
     bool whole = standing_witness(links, b, obstacles, o, node, doubt.error, body.fuzz, margin,
-                                  scratch, common, known);
+                                  scratch, live.meeting, common, known);
     deep = known.depth > 0.0;
     return whole;
   };
@@ -173,7 +174,8 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
       Common at_end;
       end_pose(points, last, pose);
       end.state = Instant::APART;
-      if (deepest(pose, links, b, obstacles, o, scratch, at_end)) remember(end, at_end);
+      if (deepest(pose, links, b, obstacles, o, scratch, live.meeting, at_end))
+        remember(end, at_end);
     }
     if (!(deep_start && deep_end) && live.start.state == Instant::DEEP &&
         live.end.state == Instant::DEEP && moving())

@@ -79,8 +79,9 @@ inline bool moving_witness(const Solids& links, int64_t b, const Solids& obstacl
 // when the point is proved.
 inline bool standing_witness(const Solids& links, int64_t b, const Solids& obstacles, int64_t o,
                              const Node& node, double error, double fuzz, double margin,
-                             std::vector<double>& moved, Common& found, Known& known) {
-  if (!deepest(node.pose, links, b, obstacles, o, moved, found)) return false;
+                             std::vector<double>& moved, Meeting& meeting, Common& found,
+                             Known& known) {
+  if (!deepest(node.pose, links, b, obstacles, o, moved, meeting, found)) return false;
   if (!(found.mine > fuzz + margin && found.theirs > margin)) return false;
   for (int r = 0; r < 3; r++) {
     known.place[r] = found.place[r];
