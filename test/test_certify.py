@@ -95,7 +95,7 @@ def sampled_free(cell, path, result, slack, rng, count, oracle):
     free = [
         row for row in result.intervals if row.status == Status.FREE and row.end_ns > row.start_ns
     ]
-    links = {cell.link_names[b] for b in cell.pairs(path.in_path).checked[:, 0]}
+    links = {cell.link_names[b] for b in cell.pairs(path.in_path).moving}
     checked = 0
     for _ in range(count if free else 0):
         row = free[rng.integers(len(free))]
@@ -543,7 +543,7 @@ def test_an_unforeseen_error_is_a_rejection(monkeypatch):
     def broken(*_args):
         raise ZeroDivisionError('broken on purpose')
 
-    monkeypatch.setattr(certify_module, 'cover', broken)
+    monkeypatch.setattr(certify_module, 'cover_all', broken)
     result = judge(slider(), slide(0.0, 1.0))
     assert result.verdict == Verdict.REJECTED
     assert result.reason_code == Reason.INTERNAL_ERROR.value

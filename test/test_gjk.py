@@ -4,13 +4,13 @@ import math
 
 import coal
 import kernel_calls
+from kernel_calls import OVERLAP, REACHED, RELATIVE, SEPARATED
 import numpy as np
 import pytest
 from random_robot import box_body, hull_body
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from trajectory_guard.kernels.gjk import OVERLAP, RELATIVE, ROUNDS, SEPARATED
 from trajectory_guard.pack import solids
 
 
@@ -35,32 +35,10 @@ def scene(rng, apart):
     return a, b, points, solids([a], [0]), solids([b], [-1])
 
 
-def scratch():
-    """Return the scratch of the search for a common point."""
-    square, column = (4, 4), 4
-    return tuple(np.empty(n) for n in (square, column, square, column, column, (200, 4)))
-
-
 def run(points, links, obstacles):
-    """Return state and output of the distance search."""
-    s, w, out = np.empty((4, 6)), np.empty(4), np.empty(8)
-    state = kernel_calls.gjk(
-        np.array([0.0, 0.0, 1.0]),
-        points,
-        1,
-        links,
-        0,
-        obstacles,
-        0,
-        0.0,
-        False,
-        1e-9,
-        ROUNDS,
-        s,
-        w,
-        out,
-    )
-    return state, out
+    """Return state, support difference and distance of the distance search."""
+    state, _, best, distance, _ = kernel_calls.gjk([0.0, 0.0, 1.0], points, links, obstacles)
+    return state, best, distance
 
 
 @pytest.mark.parametrize('apart', [0.5, 3.0, 4.0, 10.0])
@@ -81,11 +59,11 @@ def test_distance_and_direction_agree_with_coal(apart):
             request,
             result,
         )
-        state, out = run(points, links, obstacles)
+        state, best, distance = run(points, links, obstacles)
         if d > 1e-6:
             assert state == SEPARATED
-            assert out[3] - 1e-9 <= d <= out[4] + 1e-9
-            assert out[4] - out[3] <= 1e-9 + RELATIVE * out[4] + 1e-12
+            assert best - 1e-9 <= d <= distance + 1e-9
+            assert distance - best <= 1e-9 + RELATIVE * distance + 1e-12
         elif d < -1e-6:
             assert state == OVERLAP
 
@@ -96,44 +74,52 @@ def test_common_point_is_deep_in_both():
     found = 0
     for _ in range(60):
         a, _, points, links, obstacles = scene(rng, 1.5)
-        out = np.empty(6)
-        inside = kernel_calls.deepest(
-            points,
-            links,
-            0,
-            obstacles,
-            0,
-            scratch(),
-            out,
-        )
-        state, _ = run(points, links, obstacles)
+        inside, point, _, place, mine, theirs = kernel_calls.deepest(points, links, obstacles)
+        state, *_ = run(points, links, obstacles)
         assert inside == (state == OVERLAP)
         if inside:
             P = points.reshape(3, 4)
-            world = P[:, :3] @ out[:3] + P[:, 3]
-            mine = kernel_calls.depth(links.faces, *out[:3])
-            theirs = kernel_calls.depth(obstacles.faces, *world)
+            world = P[:, :3] @ point + P[:, 3]
+            np.testing.assert_allclose(place, world, atol=1e-14)
+            assert mine == kernel_calls.depth(links, point)
+            assert abs(theirs - kernel_calls.depth(obstacles, world)) < 1e-14
             assert mine > 0.0 and theirs > 0.0
             assert abs(mine - theirs) < 1e-6  # the largest common ball touches both
-            assert abs(mine - (a.faces[:, 3] - a.faces[:, :3] @ out[:3]).min()) < 1e-12
+            assert abs(mine - (a.faces[:, 3] - a.faces[:, :3] @ point).min()) < 1e-12
             found += 1
     assert found > 20
 
 
 def test_no_faces_no_claim():
     """Without an inscribed polytope nothing is ever inside."""
-    assert kernel_calls.depth(np.empty((0, 4)), 0.0, 0.0, 0.0) == -math.inf
     body = box_body(np.ones(3))
     links, obstacles = solids([body], [0]), solids([body], [-1])
-    points = np.array([[[1.0, 0, 0, 0, 0, 1.0, 0, 0, 0, 0, 1.0, 0]]])
+    points = np.array([[1.0, 0, 0, 0, 0, 1.0, 0, 0, 0, 0, 1.0, 0]])
+    assert kernel_calls.deepest(points, links, obstacles)[0]
     bare = links._replace(ranges=links.ranges * np.array([1, 1, 0, 0, 1]))
-    out = np.empty(6)
-    assert not kernel_calls.deepest(
-        points,
-        bare,
-        0,
-        obstacles,
-        0,
-        scratch(),
-        out,
-    )
+    assert kernel_calls.depth(bare, [0.0, 0.0, 0.0]) == -math.inf
+    assert not kernel_calls.deepest(points, bare, obstacles)[0]
+    assert not kernel_calls.deepest(points, links, bare)[0]
+
+
+@pytest.mark.parametrize('count', [2, 5, 13])
+def test_a_direction_for_a_swept_set_is_what_it_says(count):
+    """The support difference belongs to the direction, and no better one is promised."""
+    rng = np.random.default_rng(count)
+    reached = 0
+    for _ in range(40):
+        a, b, points, links, obstacles = scene(rng, 5.0)
+        points = points.reshape(1, 12) + 0.1 * rng.normal(size=(count, 12))
+        state, n, best, _, _ = kernel_calls.gjk(
+            [0.0, 0.0, 1.0], points, links, obstacles, want=0.1, stop=True, rounds=12
+        )
+        image = np.concatenate(
+            [a.vertices @ P[:, :3].T + P[:, 3] for P in points.reshape(-1, 3, 4)]
+        )
+        exact = (image @ n).min() - (b.vertices @ n).max()
+        assert abs(np.linalg.norm(n) - 1.0) < 1e-14
+        assert best <= exact + 1e-12
+        if state == REACHED:
+            assert exact > 0.1 - 1e-12
+            reached += 1
+    assert reached > 20

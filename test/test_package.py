@@ -5,12 +5,16 @@ from collections.abc import Iterator
 from importlib import metadata
 import os
 from pathlib import Path
+import re
+import runpy
 import subprocess
 import sys
+from typing import Any
 from xml.etree import ElementTree
 
 from ament_index_python import get_package_prefix, get_package_share_directory
 import pytest
+import setuptools
 from trajectory_guard_interfaces.msg import CertificationResult, TimeInterval
 from trajectory_guard_interfaces.srv import CertifyTrajectory
 
@@ -25,6 +29,7 @@ CORE = sorted(
     if 'ros' not in path.relative_to(ROOT).parts
 )
 KERNELS = sorted((ROOT / 'trajectory_guard' / 'kernels').glob('*.py'))
+HEADERS = sorted((ROOT / 'trajectory_guard' / 'kernels').glob('*.[hc]pp'))
 
 # The doors take messages and files; what lies behind them takes values.
 DOORS = {'__main__.py', 'command_line', 'demo', 'demo.py', 'msg_adapters'}
@@ -120,6 +125,7 @@ def test_fields() -> None:
         'clearance': 'double',
         'tracking_tolerance': 'sequence<double>',
         'deadline': 'builtin_interfaces/Duration',
+        'scope': 'uint8',
         'want_certificate': 'boolean',
     }
     assert CertifyTrajectory.Response.get_fields_and_field_types() == {
@@ -171,6 +177,36 @@ def test_only_the_shell_imports_ros(path: Path) -> None:
 def test_kernels_import_only_kernels(path: Path) -> None:
     for name in imports(path):
         assert name.split('.')[0] not in OURS or name.startswith('trajectory_guard.kernels')
+
+
+@pytest.mark.parametrize('path', HEADERS, ids=lambda path: path.name)
+def test_kernels_include_only_kernels(path: Path) -> None:
+    """In quotes: a header of the folder; in angles: the standard library, without a suffix."""
+    text = path.read_text(encoding='utf-8')
+    included = re.findall(r'^\s*#\s*include\s*(\S+)', text, re.MULTILINE)
+    for name in included:
+        if name.startswith('"'):
+            assert name.strip('"') in {
+                header.name for header in HEADERS if header.suffix == '.hpp'
+            }
+        else:
+            assert re.fullmatch(r'<[a-z_]+>', name), f'{path} includes {name}'
+    if path.suffix == '.hpp':
+        assert '#pragma once' in text
+
+
+def test_the_sources_of_the_kernels_are_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are compiled where they run, so a package without them cannot answer."""
+    told: dict[str, Any] = {}
+    monkeypatch.setattr(setuptools, 'setup', lambda **arguments: told.update(arguments))
+    monkeypatch.chdir(ROOT)
+    runpy.run_path('setup.py')
+    assert 'trajectory_guard.kernels' in told['packages']
+    patterns = told['package_data']['trajectory_guard.kernels']
+    folder = ROOT / 'trajectory_guard' / 'kernels'
+    installed = {path for pattern in patterns for path in folder.glob(pattern)}
+    assert installed == set(HEADERS)
+    assert {'kernels.cpp', 'separation.hpp'} <= {path.name for path in HEADERS}
 
 
 @pytest.mark.parametrize('path', VALUES, ids=lambda path: str(path.relative_to(ROOT)))

@@ -1,4 +1,4 @@
-"""Polynomials of a piece: exact values lie inside the bounds (Fraction and mpmath-free judges)."""
+"""Polynomials of a piece: exact values lie inside the bounds."""
 
 from fractions import Fraction
 import math
@@ -7,8 +7,7 @@ import kernel_calls
 import numpy as np
 import pytest
 
-from trajectory_guard.kernels.chain import REVOLUTE
-from trajectory_guard.kernels.piece import ECONOMISERS, POWERS
+from trajectory_guard.kernels.layout import REVOLUTE
 
 
 def evaluate(coefficients, x):
@@ -28,29 +27,32 @@ def test_restriction_contains_the_exact_polynomial(seed, size):
     """q(m + h tau) is the written polynomial within the reported rounding, in exact arithmetic."""
     rng = np.random.default_rng(seed)
     for _ in range(50):
-        c = np.zeros((1, 1, 6))
-        c[0, 0, : rng.integers(1, 7)] = rng.normal() * size
-        c[0, 0] *= rng.normal(size=6)
+        c = np.zeros(6)
+        c[: rng.integers(1, 7)] = rng.normal() * size
+        c *= rng.normal(size=6)
         level = int(rng.integers(0, 49))
         k = int(rng.integers(0, 2**level))
         h = 0.5 ** (level + 1)
         m = (2 * k + 1) * h
-        d = np.empty((1, 6))
-        span, rounding = kernel_calls.restrict(c, m, h, d)
+        d, span, rounding = kernel_calls.restrict(c, m, h)
         for tau in (-1, Fraction(-1, 3), 0, Fraction(7, 11), 1):
-            exact = evaluate(c[0, 0], Fraction(m) + Fraction(h) * tau)
-            written = evaluate(d[0], Fraction(tau))
+            exact = evaluate(c, Fraction(m) + Fraction(h) * tau)
+            written = evaluate(d, Fraction(tau))
             assert abs(exact - written) <= Fraction(rounding)
-            assert abs(written - Fraction(d[0, 0])) <= Fraction(span)
+            assert abs(written - Fraction(d[0])) <= Fraction(span)
 
 
-def test_economisers_are_monic_chebyshev():
-    """tau^k minus its row has sup norm 2^(1-k) on [-1, 1], exactly."""
-    for k in range(1, POWERS):
-        for j in range(k + 1):
-            tau = math.cos(math.pi * j / k)
-            value = tau**k - sum(ECONOMISERS[k, i] * tau**i for i in range(k))
-            assert abs(abs(value) - 2.0 ** (1 - k)) < 1e-13
+@pytest.mark.parametrize('k', range(4, 16))
+def test_powers_are_replaced_by_chebyshev(k):
+    """The cubic is tau^k minus the dropped coefficients' 2^(1-j) T_j, exactly; all are bounded."""
+    p, bound = kernel_calls.economise_to_cubic(np.eye(16)[k])
+    for tau in (Fraction(n, 7) for n in range(-7, 8)):
+        chebyshev = [Fraction(1), tau]
+        for _ in range(14):
+            chebyshev.append(2 * tau * chebyshev[-1] - chebyshev[-2])
+        lost = sum(Fraction(p[j]) * chebyshev[j] / 2 ** (j - 1) for j in range(4, 16))
+        assert evaluate(p[:4], tau) + lost == tau**k
+        assert abs(lost) <= Fraction(bound)
 
 
 @pytest.mark.parametrize('degree', [1, 3, 5])
@@ -58,16 +60,15 @@ def test_economisers_are_monic_chebyshev():
 def test_half_angle_bound_contains_the_angle(degree, span):
     """|2 atan u - phi| stays below the bound at dense places, and the bound is not idle."""
     rng = np.random.default_rng(degree)
-    p, u = np.empty(POWERS), np.empty((1, 4))
     tightest = 0.0
     for _ in range(40):
-        d = np.zeros((1, 6))
-        d[0, 1 : degree + 1] = rng.normal(size=degree) * 0.3 ** np.arange(degree)
-        d[0] *= span / np.abs(d[0, 1:]).sum()
-        bound = kernel_calls.fit_half_angle(d, np.abs(d[0, 1:]).sum(), p, u)
+        d = np.zeros(6)
+        d[1 : degree + 1] = rng.normal(size=degree) * 0.3 ** np.arange(degree)
+        d *= span / np.abs(d[1:]).sum()
+        u, bound = kernel_calls.fit_half_angle(d, np.abs(d[1:]).sum())
         for tau in np.linspace(-1.0, 1.0, 41):
-            phi = sum(d[0, k] * tau**k for k in range(1, 6))
-            off = abs(2.0 * math.atan(bernstein_value(u[0], 0.5 * (1 + tau))) - phi)
+            phi = sum(d[k] * tau**k for k in range(1, 6))
+            off = abs(2.0 * math.atan(bernstein_value(u, 0.5 * (1 + tau))) - phi)
             assert off <= bound
             tightest = max(tightest, off / bound)
     if span > 0.1:
@@ -76,39 +77,34 @@ def test_half_angle_bound_contains_the_angle(degree, span):
 
 def test_a_joint_that_turns_too_far_is_frozen():
     """Beyond the range of the series the motion is constant and the whole turn is the error."""
-    d = np.array([[0.0, 7.0, 0.0, 0.0, 0.0, 0.0]])
-    u = np.ones((1, 4))
-    assert kernel_calls.fit_half_angle(d, 7.0, np.empty(POWERS), u) == 7.0
+    u, bound = kernel_calls.fit_half_angle([0.0, 7.0, 0.0, 0.0, 0.0, 0.0], 7.0)
+    assert bound == 7.0
     assert not u.any()
 
 
 def test_nan_freezes_rather_than_fits():
     """A NaN span never passes for a small one."""
-    d = np.full((1, 6), np.nan)
-    u = np.ones((1, 4))
-    assert math.isnan(kernel_calls.fit_half_angle(d, math.nan, np.empty(POWERS), u))
+    u, bound = kernel_calls.fit_half_angle(np.full(6, np.nan), math.nan)
+    assert math.isnan(bound)
     assert not u.any()
 
 
 def test_slide_bound_contains_the_quintic():
     """A prismatic joint's cubic differs from its quintic by no more than the bound."""
     rng = np.random.default_rng(2)
-    p, u = np.empty(POWERS), np.empty((1, 4))
     for _ in range(100):
-        d = rng.normal(size=(1, 6))
-        bound = kernel_calls.fit_slide(d, p, u)
+        d = rng.normal(size=6)
+        u, bound = kernel_calls.fit_slide(d)
         for tau in np.linspace(-1.0, 1.0, 21):
-            exact = sum(d[0, k] * tau**k for k in range(1, 6))
-            assert abs(bernstein_value(u[0], 0.5 * (1.0 + tau)) - exact) <= bound
+            exact = sum(d[k] * tau**k for k in range(1, 6))
+            assert abs(bernstein_value(u, 0.5 * (1.0 + tau)) - exact) <= bound
 
 
 def test_factors_are_a_rotation_in_bernstein_form():
     """cosine^2 + sine^2 = weight^2 at every place, and the ratio bounds the columns."""
     rng = np.random.default_rng(3)
-    c, s, w = np.empty(7), np.empty(7), np.empty(7)
     for _ in range(50):
-        u = rng.normal(size=(1, 4)) * 0.3
-        degree, kappa = kernel_calls.factors(REVOLUTE, u, c, s, w)
+        c, s, w, degree, kappa = kernel_calls.factors(REVOLUTE, rng.normal(size=4) * 0.3)
         assert degree == 6
         for place in np.linspace(0.0, 1.0, 11):
             cv, sv, wv = (bernstein_value(x, place) for x in (c, s, w))
@@ -119,7 +115,6 @@ def test_factors_are_a_rotation_in_bernstein_form():
 
 def test_factors_refuse_weights_that_are_not_positive():
     """A wild u has no usable hull, and says so."""
-    c, s, w = np.empty(7), np.empty(7), np.empty(7)
-    for u in ([[9.0, -90.0, 90.0, -9.0]], [[np.nan] * 4]):
-        _, kappa = kernel_calls.factors(REVOLUTE, np.array(u), c, s, w)
+    for u in ([9.0, -90.0, 90.0, -9.0], [np.nan] * 4):
+        *_, kappa = kernel_calls.factors(REVOLUTE, u)
         assert not kappa < math.inf

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from random_robot import box_body, core, hull_body, random_body
 
-from trajectory_guard.kernels.solids import CORE, FAR, FIRST, LAST
+from trajectory_guard.kernels.layout import CORE, FAR, FIRST, LANES, LAST
 from trajectory_guard.pack import solids
 
 
@@ -58,7 +58,7 @@ def test_bound_is_below_the_exact_value(scale):
         points = controls(rng, 5, scale)
         n = unit(rng)
         reach = float(links.size[0, FAR] + np.abs(points[0, :, 3::4]).sum(axis=1).max())
-        gap = kernel_calls.separation(*n, points, 0, 5, links, 0, obstacles, 0, 0.0, 2.0, reach)
+        gap = kernel_calls.separation(n, points, links, 0, obstacles, 0, 0.0, 2.0, reach)
         exact = exact_gap(n, points, body, obstacle)
         length = math.sqrt(float(sum(Fraction(float(x)) ** 2 for x in n)))
         assert Fraction(gap) <= exact / Fraction(length)
@@ -73,7 +73,7 @@ def test_bound_is_below_sampled_supports():
         links, obstacles = solids([body], [0]), solids([obstacle], [-1])
         points = controls(rng, 4)
         n = unit(rng)
-        gap = kernel_calls.separation(*n, points, 0, 4, links, 0, obstacles, 0, 0.01, 2.0, 9.0)
+        gap = kernel_calls.separation(n, points, links, 0, obstacles, 0, 0.01, 2.0, 9.0)
         low = min(
             (n @ (core(body, rng) @ P[:, :3].T + P[:, 3]).T).min()
             for P in points[0].reshape(-1, 3, 4)
@@ -95,8 +95,8 @@ def test_nonsense_never_certifies(bad, where):
     points = controls(rng, 3)
     n = np.array([1.0, 0.0, 0.0])
     error, kappa, reach = 0.0, 2.0, 9.0
-    whole = (points, 0, 3, links, 0, obstacles, 0)
-    assert kernel_calls.separation(*n, *whole, error, kappa, reach) > 5.0
+    whole = (points, links, 0, obstacles, 0)
+    assert kernel_calls.separation(n, *whole, error, kappa, reach) > 5.0
     if where == 'control':
         points[0, 1, 3] = -bad
     elif where == 'vertex':
@@ -109,7 +109,7 @@ def test_nonsense_never_certifies(bad, where):
         n[0] = bad
     else:
         kappa = bad
-    assert not kernel_calls.separation(*n, *whole, error, kappa, reach) > 0.0
+    assert not kernel_calls.separation(n, *whole, error, kappa, reach) > 0.0
 
 
 @pytest.mark.parametrize('length', [0.0, 0.5, 1.0 + 1e-12, 1e200, 2.0])
@@ -118,9 +118,8 @@ def test_a_direction_that_is_not_unit_is_refused(length):
     rng = np.random.default_rng(4)
     links = solids([box_body(np.ones(3))], [0])
     obstacles = solids([box_body(np.ones(3), (-9.0, 0.0, 0.0))], [-1])
-    gap = kernel_calls.separation(
-        length, 0.0, 0.0, controls(rng, 3), 0, 3, links, 0, obstacles, 0, 0.0, 2.0, 9.0
-    )
+    n = [length, 0.0, 0.0]
+    gap = kernel_calls.separation(n, controls(rng, 3), links, 0, obstacles, 0, 0.0, 2.0, 9.0)
     assert gap == -math.inf
 
 
@@ -131,9 +130,8 @@ def test_tangency_and_one_step_either_side():
     for gap, free in ((-1e-9, False), (0.0, False), (1e-15, False), (1e-11, True)):
         points[0, 0, 3] = 1.0 + gap
         obstacles = solids([box_body(np.ones(3))], [-1])
-        bound = kernel_calls.separation(
-            1.0, 0.0, 0.0, points, 0, 1, links, 0, obstacles, 0, 0.0, 1.0, 2.0
-        )
+        n = [1.0, 0.0, 0.0]
+        bound = kernel_calls.separation(n, points, links, 0, obstacles, 0, 0.0, 1.0, 2.0)
         assert (bound > 0.0) is free
 
 
@@ -144,11 +142,15 @@ def test_box_and_sphere_contain_the_core(seed):
     for scale in (1e-6, 1.0, 1e6):
         body = random_body(rng, scale)
         packed = solids([body], [-1])
-        assert packed.ranges[0, LAST] - packed.ranges[0, FIRST] == len(body.vertices)
+        count = packed.ranges[0, LAST] - packed.ranges[0, FIRST]
+        assert len(body.vertices) <= count < len(body.vertices) + LANES and count % LANES == 0
+        np.testing.assert_array_equal(
+            np.unique(packed.vertices.T, axis=0), np.unique(body.vertices, axis=0)
+        )
         points = core(body, rng)
         for x in points:
             # A rim sample is off by its own rounding.
-            assert kernel_calls.box_distance(*x, packed, 0) <= 1e-14 * scale
+            assert kernel_calls.box_distance(x, packed) <= 1e-14 * scale
         tolerance = 1.0 + 1e-14
         assert (
             np.linalg.norm(points - body.center, axis=1).max() <= packed.size[0, CORE] * tolerance
@@ -179,4 +181,4 @@ def test_the_box_contains_a_disc_that_is_almost_aligned(tilt, radius):
     packed = solids([body], [-1])
     rim = radius * np.array([math.cos(tilt), 0.0, -math.sin(tilt)])
     for x in (rim, -rim, np.array([0.0, radius, 0.0])):
-        assert kernel_calls.box_distance(*x, packed, 0) <= 2e-16 * radius
+        assert kernel_calls.box_distance(x, packed) <= 2e-16 * radius
