@@ -2,7 +2,7 @@
 G1 by brute force: no configuration in the tube of a free interval comes within the clearance.
 
 The judge is coal on random configurations, near the ends of free intervals and at the corners of
-the tracking tolerance on purpose. The normal run takes 10^5 of them; ``-m slow`` takes 10^6 in
+the tracking tolerance on purpose. The normal run takes 10^5 of them; ``-m slow`` takes 10^7 in
 two processes, or as many as the environment variable TRAJECTORY_GUARD_SWEEP says.
 """
 
@@ -25,7 +25,7 @@ from trajectory_guard.settings import Settings
 from trajectory_guard.workcell import Workcell
 
 SAMPLES = 100_000
-MANY = int(float(os.environ.get('TRAJECTORY_GUARD_SWEEP', '1e6')))
+MANY = int(float(os.environ.get('TRAJECTORY_GUARD_SWEEP', '1e7')))
 PROCESSES = 2
 
 # Clearance [m] and tracking tolerance [rad or m].
@@ -120,7 +120,7 @@ def test_free_is_free():
 
 @pytest.mark.slow
 def test_free_is_free_many():
-    """TRAJECTORY_GUARD_SWEEP samples, by default 10^6, in two processes."""
+    """TRAJECTORY_GUARD_SWEEP samples, by default 10^7, in two processes."""
     share = -(-MANY // PROCESSES)
     # Each round is a new set of random robots and seeds.
     rounds = max(1, round(share / 500_000))

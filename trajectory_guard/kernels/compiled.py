@@ -81,7 +81,8 @@ def _path(unit: Path) -> Path:
 @functools.cache
 def _digest(unit: Path) -> str:
     digest = hashlib.sha256(repr((FLAGS, os.environ.get('CXX'))).encode())
-    for source in (*sorted(SOURCES.glob('*.hpp')), unit):
+    # A unit of somebody else's may include any of the sources.
+    for source in (*sorted(SOURCES.glob('*.[ch]pp')), unit):
         digest.update(source.name.encode() + b'\0' + source.read_bytes())
     digest.update(_processor().encode())
     return digest.hexdigest()[:16]
