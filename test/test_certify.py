@@ -264,6 +264,17 @@ def test_clearance_and_tracking_are_inside_the_bound(clearance, tracking):
     assert end - 4e-4 / 5.0 * SECOND - 2 <= result.intervals[0].end_ns <= end
 
 
+@pytest.mark.parametrize('tracking', [0.0, 0.02])
+def test_the_lower_bound_of_a_gap_is_one_for_the_whole_tube(tracking):
+    """Found in review: the bound that is reported left the tracking tolerance out."""
+    settings = Settings(clearance=0.015, tracking_tolerance=(tracking,))
+    (_, row) = judge(slider(), slide(0.0, 2.49), None, settings).intervals
+    assert row.status == Status.SUSPECT
+    assert row.gap_lower <= 0.01 - tracking
+    assert row.gap_lower > 0.01 - tracking - 2e-3
+    assert row.gap_upper >= 0.01
+
+
 def test_start_inside_an_obstacle_is_not_free():
     """Disjoint, not only contact-free: a body wholly inside never touches a surface."""
     small = box_body(np.full(3, 0.1))

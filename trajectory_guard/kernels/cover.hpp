@@ -321,6 +321,8 @@ class Cover {
   // open are then the last ones; else a leaf was written.
   bool try_pairs(const Piece& piece, int64_t examined, int64_t first, bool deep) {
     Known known, worst{};
+    // Of all pairs that stay open, so that it holds for whichever is named, tracking included.
+    double lowest = INFINITY;
     int64_t status = UNDECIDED, named_body = -1, named_obstacle = -1, named_witness = 0;
     int64_t kept = first, last = static_cast<int64_t>(work.live.size());
     for (int64_t i = first; i < last; i++) {
@@ -333,6 +335,9 @@ class Cover {
       Outcome outcome =
           examine(motion, ask, piece, examined, live, work.scratch, work.proof, known);
       if (outcome == Outcome::CLOSED) continue;
+      double lower = known.lower - body.slack;
+      lower -= 4.0 * UNIT_ROUNDOFF * (std::fabs(known.lower) + body.slack);
+      if (!(lower >= lowest)) lowest = lower;
       double limit = (request.clearance + body.slack) * UP;
       int64_t witness = witness_level(known.depth, body.linear);
       // A body that stands in this piece stands in both halves.
@@ -363,6 +368,7 @@ class Cover {
     } else if (status == SUSPECT) {
       double limit = (request.clearance + motion.bodies[named_body].slack) * UP;
       if (!(worst.upper <= limit + request.tolerance)) reason = BY_DEPTH;
+      worst.lower = lowest;
     }
     write(piece, status, reason, named_body, named_obstacle, named_witness, worst);
     return true;
