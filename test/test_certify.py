@@ -499,6 +499,15 @@ def test_a_path_of_the_wrong_shape_is_refused(change):
         certify(slider(), dataclasses.replace(path, **change))
 
 
+def test_a_jump_in_no_time_is_refused():
+    """Found in review: what happens in a segment without length had no interval."""
+    path = joint_path(slider().robot.movable, slide(0.0, 1.0, 4.9, 5.0))
+    knots = path.knots_ns.copy()
+    knots[2] = knots[1]
+    with pytest.raises(RequestError):
+        dataclasses.replace(path, knots_ns=knots)
+
+
 def test_a_standing_body_within_rounding_is_one_piece():
     """Found in review: what does not move was halved to the end of the budget."""
     gap = 1e-9

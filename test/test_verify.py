@@ -364,7 +364,7 @@ def test_each_entry_of_each_kind_is_needed(case):
         (('balls', 0, 2), [2, 2], 'balls[0]'),
         (('balls', 0, 2), [True], 'balls[0], obstacle'),
         (('pieces', 0), [0, 4, 2], 'pieces[0], numerator'),
-        (('pieces', 0), [0, 0, 61], 'pieces[0], level'),
+        (('pieces', 0), [0, 0, 62], 'pieces[0], level'),
         (('pieces', 0), [3, 0, 0], 'pieces[0], segment'),
         (('pieces', 0), [0, 0], 'pieces[0]'),
         (('pieces', 0), [0, 0, True], 'pieces[0][2]'),

@@ -7,6 +7,7 @@ import pytest
 from random_robot import box_body, Given
 
 from trajectory_guard.certify import judge
+from trajectory_guard.primitive import Sphere
 from trajectory_guard.result import Verdict
 from trajectory_guard.robot import Collision, Joint, JointType, Robot
 from trajectory_guard.scene import Obstacle, Scene
@@ -40,6 +41,33 @@ def test_certificate_of_a_witness(size, obstacle, center, turn):
     arm = Collision(np.eye(4), Given(box_body(size, (0.5, 0.0, 0.0))))
     robot = Robot('r', 'base', (joint,), {'arm': (arm,)}, b'')
     scene = Scene((Obstacle('o', (box_body(obstacle, center),)),), 'x')
+    trajectory = Trajectory.from_points(['j'], [Point(0, [-turn]), Point(10**9, [turn])])
+    settings = Settings(tolerance=1e-3, scope=Scope.VERDICT, want_certificate=True)
+    result = judge(Workcell(robot, scene), trajectory, None, settings)
+    assert result.verdict == Verdict.COLLISION
+    assert verify(result.certificate, robot, scene, trajectory).verdict == 'collision'
+
+
+@pytest.mark.parametrize('arm', [0.02, 0.05, 0.1])
+@pytest.mark.parametrize('turn', [0.3, 1.0, 3.0])
+def test_certificate_of_a_ball(arm, turn):
+    """Found in review: a point in the ball moves farther than the core that was bounded."""
+    joint = Joint(
+        'j',
+        JointType.REVOLUTE,
+        'base',
+        'arm',
+        np.eye(4),
+        np.array([0.0, 0.0, 1.0]),
+        -math.inf,
+        math.inf,
+        None,
+    )
+    body = Sphere(0.2).load().body
+    place = np.eye(4)
+    place[0, 3] = arm
+    robot = Robot('r', 'base', (joint,), {'arm': (Collision(place, Given(body)),)}, b'')
+    scene = Scene((Obstacle('o', (box_body((0.02, 0.05, 0.05), (arm + 0.16, 0.0, 0.0)),)),), 'x')
     trajectory = Trajectory.from_points(['j'], [Point(0, [-turn]), Point(10**9, [turn])])
     settings = Settings(tolerance=1e-3, scope=Scope.VERDICT, want_certificate=True)
     result = judge(Workcell(robot, scene), trajectory, None, settings)

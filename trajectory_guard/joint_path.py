@@ -42,7 +42,7 @@ class JointPath:
         for the value at every s as well [rad or m].
     :param unknown_until_ns: before this time no start state tells where the arm is [ns].
     :param limits_checked: whether the joint limits were enforced.
-    :raises RequestError: an array has another shape, or knots fall.
+    :raises RequestError: an array has another shape, or knots do not rise.
     """
 
     joint_names: tuple[str, ...]
@@ -71,7 +71,9 @@ class JointPath:
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         knots = self.knots_ns
-        if np.count_nonzero(knots[1:] < knots[:-1]) or knots[0] < 0:
+        # Without length only a pose is a segment: what happens in no time has no interval.
+        rises = knots[1:] > knots[:-1] if segments > 1 else knots[1:] >= knots[:-1]
+        if not rises.all() or knots[0] < 0:
             raise RequestError(Reason.UNSORTED_TIMES, f'knots_ns must rise, got {self.knots_ns}')
 
     @property

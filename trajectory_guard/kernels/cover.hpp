@@ -201,7 +201,8 @@ class Cover {
     leaves.resize(kept);
   }
 
-  // A half of a piece, with the pairs that stayed open from `first` on; all pairs if it was crowded.
+  // A half of a piece, with the pairs that stayed open from `first` on; all pairs if it was
+  // crowded.
   Task half(const Task& task, bool second, int64_t first) const {
     const Piece& p = task.piece;
     Piece piece{p.segment, 2 * p.numerator + second, p.level + 1};
@@ -339,7 +340,10 @@ class Cover {
       lower -= 4.0 * UNIT_ROUNDOFF * (std::fabs(known.lower) + body.slack);
       if (!(lower >= lowest)) lowest = lower;
       double limit = (request.clearance + body.slack) * UP;
-      int64_t witness = witness_level(known.depth, body.linear);
+      // The common point may lie off the core, within the ball, and turns with it.
+      int64_t witness =
+          witness_level(known.depth, body.linear + motion.turned(live.body) *
+                                                       motion.links.length(live.body, BALL));
       // A body that stands in this piece stands in both halves.
       bool ends = deep || body.sweep == 0.0 ||
                   settled(known, limit, body.sweep, request.tolerance) ||
@@ -368,8 +372,8 @@ class Cover {
     } else if (status == SUSPECT) {
       double limit = (request.clearance + motion.bodies[named_body].slack) * UP;
       if (!(worst.upper <= limit + request.tolerance)) reason = BY_DEPTH;
-      worst.lower = lowest;
     }
+    if (status != FREE) worst.lower = lowest;
     write(piece, status, reason, named_body, named_obstacle, named_witness, worst);
     return true;
   }

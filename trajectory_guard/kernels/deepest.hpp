@@ -93,8 +93,8 @@ struct Basis4 {
     at.own[k] = own;
   }
 
-  // A regular tetrahedron around a solid, multipliers 1/4 each. The rows (n, 1), n corners of a cube
-  // over sqrt(3), are orthogonal: their inverse is known.
+  // A regular tetrahedron around a solid, multipliers 1/4 each. The rows (n, 1), n corners of a
+  // cube over sqrt(3), are orthogonal: their inverse is known.
   void surround(const double* centre, double radius) {
     static const double CORNER[4][3] = {{1, 1, 1}, {-1, -1, 1}, {-1, 1, -1}, {1, -1, -1}};
     for (int k = 0; k < 4; k++) {

@@ -39,6 +39,10 @@ constexpr double LARGEST_ANGLE = 1.5;
 constexpr int CONTROLS = 13;  // control points: degree 5 raised to 12, which draws the hull tight
 constexpr int CONTROL_ROW = 16;  // room for them in whole vectors; the last one is repeated
 constexpr double MAJORANT = 8.0;
+// Rounding of cosine and sine, in u: three economised products each and one more for the sine, on
+// one-norms below 2.3, with their error bounds as much again, come to less than 700 at the largest
+// angle.
+constexpr double SERIES = 1024.0;
 constexpr int POSE = 16;  // a pose by columns x, y, z, t of 4, the fourth entry unused
 constexpr double LARGEST_ENTRY = 1e100;  // beyond it products might overflow: the piece is unsound
 
@@ -132,7 +136,7 @@ inline T fit_rotation(const T* phi, T span, T* cosine, T* sine) {
   cosine_error += fifth / FACTORIAL_10;
   T sine_error = span * h_error + dropped(p) + fifth * span / FACTORIAL_11;
   T delta = root(cosine_error * cosine_error + sine_error * sine_error);
-  return (delta + 256.0 * UNIT_ROUNDOFF) * UP;
+  return (delta + SERIES * UNIT_ROUNDOFF) * UP;
 }
 
 // The polynomial pose of a node: power k of tau is the pose at power[k].
@@ -246,7 +250,7 @@ inline Growth extend(const Polynomial* above, const Growth* before, int64_t kind
     total += std::sqrt(sum(xy * xy + zt * zt));
   }
   g.size = total;
-  g.kappa = std::fmax(g.kappa, total);
+  g.kappa = std::fmax(g.kappa, MAJORANT * total);
   return g;
 }
 

@@ -1,5 +1,5 @@
-// The functions that Python calls. Each returns 0, 1 if memory ran out, or 2 if the path is not what
-// kernels can take.
+// The functions that Python calls. Each returns 0, 1 if memory ran out, or 2 if the path is not
+// what kernels can take.
 #include <algorithm>
 #include <chrono>
 #include <deque>

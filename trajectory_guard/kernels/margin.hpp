@@ -8,8 +8,9 @@
 // **A node of the polynomial chain** (`economised`). The error of a chain is telescoped over its
 // nodes on the true point q of the node's frame, so each node's rounding counts once and is not
 // transported. |q| <= reach, which also bounds the sum of all offsets. Let S be the sum over the
-// powers of the Frobenius norms of the linear part of the pose above, c + s the sum of the absolute
-// coefficients of cosine and sine (c >= 1), and kappa >= 8 (c + s) S.
+// powers of the Frobenius norms of the linear part of the pose above, c + s the sum of the
+// absolute coefficients of cosine and sine (c >= 1), and kappa >= 8 (c + s) S; where no joint
+// moves c + s = 1.
 //   - The constant transform T_j R(theta_c) is the rounded image of an exactly rigid one: origin,
 //     alignment, sine, cosine and one product leave 16 u an entry, 48 u as a matrix, and as much
 //     on the offsets. Applying it takes 3 products and 3 sums an entry, 4 u sqrt(3). Together less
@@ -41,9 +42,10 @@
 // where kappa is the largest along the chain and depth counts every rounded transform, so the
 // folding of fixed joints is inside.
 //
-// **Separating plane** (`separation`). With |n| <= 1 + 4u the gradient g = P^T n is 3 products and
-// sums, g.x + offset 4 more, on numbers up to kappa reach; n.p is 5 on |obstacle|; the disc adds 8,
-// the sphere that lets a control point be skipped 12, the comparison 1: at most 30 roundings:
+// **Separating plane** (`separation`). With |n| <= 1 + 18u the gradient g = P^T n is 3 products
+// and sums, g.x + offset 4 more, on numbers up to kappa reach; n.p is 5 on |obstacle|; the disc
+// adds 8, the sphere that lets a control point be skipped 12, the comparison 1: at most 30
+// roundings, and 18 for the length of n:
 //
 //     PLANE * u * (kappa * reach + |obstacle|),        PLANE = 64.
 //

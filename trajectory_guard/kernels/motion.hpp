@@ -185,6 +185,14 @@ struct Motion {
     return sum(total) * UP;
   }
 
+  // How far the joints above a body turn it in a piece, linear in its length [rad].
+  double turned(int64_t b) const {
+    double total = 0.0;
+    for (int64_t j = links.range(b, NODE); j >= 0; j = chain.parent[j])
+      if (chain.kind[j] == REVOLUTE) total += span[j];
+    return total * UP;
+  }
+
   // The control points of a body's node, built when first asked for.
   const Controls& controls(int64_t node) {
     Node& n = nodes[node];

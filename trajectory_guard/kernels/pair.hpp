@@ -54,7 +54,8 @@ inline void keep(Live& live, const double* n, double lower, Known& known) {
   }
 }
 
-// The bound that the nearest link point at the centre gives for the whole piece.
+// About how far the two come near at every instant of the piece, from the nearest link point found
+// at the centre; it decides only how fine a suspect piece is cut.
 inline double near_bound(const Search& found, const Node& node, double balls, double error) {
   double off[3], x[3];
   for (int r = 0; r < 3; r++)

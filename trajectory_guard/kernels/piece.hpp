@@ -5,7 +5,8 @@
 //
 // **Rounding of the angle.** The Taylor shift of a polynomial of degree 5 to m in [0, 1] is 15
 // multiply-adds and one scaling; relative to sum |c_k| all coefficients together err by less than
-// 32 u. Central angle, sine and cosine add 4 u.
+// 32 u: the shifted polynomial is scaled by h^k, and h + m <= 1 keeps the sum of h^k times the
+// shifted majorant below that sum. Central angle, sine and cosine add 4 u.
 #pragma once
 
 #include <cmath>

@@ -11,8 +11,8 @@ namespace guard {
 // Kinds of entries.
 enum : int64_t { BALLS_APART, PLANE_BETWEEN, PLANE_TURNING };
 
-// The pair is apart on the piece; the direction of the plane as in `separation`, and its offset if it
-// stands: n.x = offset.
+// The pair is apart on the piece; the direction of the plane as in `separation`, and its offset if
+// it stands: n.x = offset.
 struct Entry {
   int64_t kind, piece, body, obstacle;
   Turn turn;

@@ -7,8 +7,9 @@
 //
 // where rho_j(x) bounds the distance of x to the axis of joint j over *all* configurations of the
 // joints beyond j (for a prismatic joint the factor is |eps_j| and rho_j = 1). The distance to the
-// axis is at most the part of the next joint's origin perpendicular to the axis plus the lengths of
-// all later offsets and slides plus |x|.
+// axis is at most the part of the next joint's origin perpendicular to the axis plus the lengths
+// of all later offsets and slides plus |x|. A body's ball is left out: it looks the same however
+// the body turns, so it stays where its centre is.
 #pragma once
 
 #include <cmath>

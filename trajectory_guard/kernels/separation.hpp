@@ -17,10 +17,11 @@
 //
 //     f_i(v) = sum_j a_ij N_j.(P_{i-j} v),        a_ij = C(12, i-j) C(2, j) / C(14, i),
 //
-// each affine in v; the obstacle's support is convex in n, so it stays below the polynomial with the
-// Bernstein values max_p N_j.p, which degree 14 turns into sum_j a_ij max_p N_j.p. With N = max |N_j|
-// >= |n(tau)|, the pair keeps the distance L during the whole piece if every f_i(v) minus that exceeds
-// N (L + e + r + r') + rounding. A disc is bounded alike, as its support is convex in n, too.
+// each affine in v; the obstacle's support is convex in n, so it stays below the polynomial with
+// the Bernstein values max_p N_j.p, which degree 14 turns into sum_j a_ij max_p N_j.p. With N =
+// max |N_j| >= |n(tau)|, the pair keeps the distance L during the whole piece if every f_i(v)
+// minus that exceeds N (L + e + r + r') + rounding. A disc is bounded alike, as its support is
+// convex in n, too.
 #pragma once
 
 #include <cmath>

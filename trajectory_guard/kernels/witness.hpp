@@ -12,6 +12,11 @@
 //
 // The piece overlaps at every instant if all Q_k lie inside the obstacle by more than the error, or
 // if they stay nearer to the chord of the two places than the depths together.
+//
+// The true solids are the core, moved, plus a ball that turning does not change; so an overlap at
+// the built pose is one at the true pose if the core is off by less than the depths. Only where
+// the linear part is no rotation does the built motion move a point of the ball otherwise: eps
+// times its radius.
 #pragma once
 
 #include "deepest.hpp"
@@ -75,8 +80,8 @@ inline bool moving_witness(const Solids& links, int64_t b, const Solids& obstacl
 
 // Look for a common point at the centre: true if it proves the overlap of the whole piece.
 //
-// fuzz: bound on the error of the centre pose. known: upper, place, depth and the witness are written
-// when the point is proved.
+// fuzz: bound on the error of the centre pose. known: upper, place, depth and the witness are
+// written when the point is proved.
 inline bool standing_witness(const Solids& links, int64_t b, const Solids& obstacles, int64_t o,
                              const Node& node, double error, double fuzz, double margin,
                              std::vector<double>& moved, Meeting& meeting, Common& found,

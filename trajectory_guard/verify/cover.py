@@ -11,7 +11,7 @@ from trajectory_guard.verify.numbers import integer
 STATUSES = ('free', 'suspect', 'collision')
 
 # How finely a segment may be cut.
-DEEPEST_LEVEL = 60
+DEEPEST_LEVEL = 61
 # Times are integers in units of 2^-DEEPEST_LEVEL ns.
 UNIT = 1 << DEEPEST_LEVEL
 
