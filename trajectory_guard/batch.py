@@ -34,15 +34,20 @@ def judge_all(
     states = starts if starts is not None else [None] * len(trajectories)
     jobs = list(zip(trajectories, states, strict=True))
     # Each answer has a deadline of its own; without one a call of the kernels takes several, so
-    # that threads seldom wait for the interpreter.
+    # that threads seldom wait for the interpreter. They are dealt out like cards, because what is
+    # dear often comes in a row.
     size = TOGETHER if settings is None or settings.deadline_ns is None else 1
-    chunks = [jobs[i : i + size] for i in range(0, len(jobs), size)]
+    hands = -(-len(jobs) // size)
+    results: list[Result | None] = [None] * len(jobs)
 
-    def some(chunk: list[tuple[Trajectory, JointState | None]]) -> list[Result]:
-        return judge_some(workcell, chunk, settings)
+    def judge_hand(hand: int) -> None:
+        results[hand::hands] = judge_some(workcell, jobs[hand::hands], settings)
 
-    workers = min(threads or os.cpu_count() or 1, len(chunks))
+    workers = min(threads or os.cpu_count() or 1, hands)
     if workers <= 1:
-        return [result for chunk in chunks for result in some(chunk)]
-    with ThreadPoolExecutor(workers) as pool:
-        return [result for results in pool.map(some, chunks) for result in results]
+        for hand in range(hands):
+            judge_hand(hand)
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            list(pool.map(judge_hand, range(hands)))
+    return [result for result in results if result is not None]
