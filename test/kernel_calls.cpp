@@ -287,7 +287,7 @@ int64_t call_layout(char* text, int64_t room) {
   SIZE(Leaf);
   FIELD(Leaf, segment), FIELD(Leaf, start), FIELD(Leaf, end), FIELD(Leaf, level);
   FIELD(Leaf, status), FIELD(Leaf, reason), FIELD(Leaf, body), FIELD(Leaf, obstacle);
-  FIELD(Leaf, witness), FIELD(Leaf, piece), FIELD(Leaf, known);
+  FIELD(Leaf, witness), FIELD(Leaf, known);
   SIZE(Known);
   FIELD(Known, lower), FIELD(Known, upper), FIELD(Known, place), FIELD(Known, depth);
   FIELD(Known, near), FIELD(Known, start), FIELD(Known, end);

@@ -224,7 +224,7 @@ class Cover {
   void write(const Piece& p, int64_t status, int64_t reason, int64_t body, int64_t obstacle,
              int64_t witness, const Known& known) {
     work.leaves.push_back({p.segment, p.numerator, p.numerator + 1, p.level, status, reason, body,
-                           obstacle, witness, work.pieces, known});
+                           obstacle, witness, known});
   }
 
   // Examine a piece: true if it must be halved, its open pairs then lie behind all others; else a

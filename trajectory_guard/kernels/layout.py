@@ -36,7 +36,7 @@ BALLS_APART, PLANE_BETWEEN, PLANE_TURNING = range(3)
 # The leaf [start, end] / 2^level of a segment, see ``leaf.hpp``; lengths in m.
 LEAF = np.dtype(
     [(name, np.int64) for name in ('segment', 'start', 'end', 'level', 'status', 'reason')]
-    + [(name, np.int64) for name in ('body', 'obstacle', 'witness', 'piece')]
+    + [(name, np.int64) for name in ('body', 'obstacle', 'witness')]
     + [('lower', float), ('upper', float), ('place', float, 3), ('depth', float), ('near', float)]
     + [('y0', float, 3), ('y1', float, 3)]
 )

@@ -23,7 +23,7 @@ struct Known {
 // The leaf [start, end] / 2^level of a segment; body and obstacle are -1 where no pair is named.
 // The middle 2^-witness of the leaf provably collides, 0 if none does.
 struct Leaf {
-  int64_t segment, start, end, level, status, reason, body, obstacle, witness, piece;
+  int64_t segment, start, end, level, status, reason, body, obstacle, witness;
   Known known;
 };
 
