@@ -19,14 +19,16 @@ ctx.prec = 256
 
 
 def rational(x):
-    """Return a double as a rational."""
+    """Return a double as a rational; a rational is one already."""
+    if isinstance(x, fmpq):
+        return x
     numerator, denominator = float(x).as_integer_ratio()
     return fmpq(numerator, denominator)
 
 
 def ball(x):
     """Return a rational or a double as an arb ball."""
-    x = x if isinstance(x, fmpq) else rational(x)
+    x = rational(x)
     return arb(x.p) / arb(x.q)
 
 
@@ -138,7 +140,7 @@ def true_pose(chain, coefficients, s):
 
 
 def built_pose(matrices, weights, tau):
-    """Return the built motion's pose at a rational tau, (3, 4), in balls."""
+    """Return a motion's pose at a rational tau, (3, 4), in balls; weights with binomials."""
     degree = len(weights) - 1
     s = (fmpq(1) + tau) / 2
     basis = [rational(w) * s**i * (1 - s) ** (degree - i) for i, w in enumerate(weights)]

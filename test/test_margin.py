@@ -1,6 +1,7 @@
 """The rounding margins against 256-bit arithmetic: no error exceeds what is counted for it."""
 
 from fractions import Fraction
+from math import comb
 
 from exact_chain import (
     arb_mat,
@@ -27,7 +28,7 @@ from scipy.spatial.transform import Rotation
 
 from trajectory_guard.body import ConvexBody
 from trajectory_guard.kernels import layout
-from trajectory_guard.motion import Builder, rational_motion
+from trajectory_guard.link_motion import Builder, rational_motion
 from trajectory_guard.pack import solids
 from trajectory_guard.robot import JointType
 
@@ -201,6 +202,7 @@ def test_any_robot_stays_within_its_error(seed, builder):
         link = cell.link_names[body]
         given = cell.robot.bodies(link)[0]
         motion = rational_motion(cell, path, body, 0, 1, 2, builder=builder)
+        scaled = [rational(w) * comb(motion.degree, i) for i, w in enumerate(motion.weights)]
         L = matrix(cell.tree.link_pose[link][:3])
         # What moving the body to its node's frame may have cost is in its ball.
         allowed = motion.error + cell.links.size[body, layout.BALL] - given.ball
@@ -213,7 +215,7 @@ def test_any_robot_stays_within_its_error(seed, builder):
                     value = value * s + rational(x)
                 q[name] = value
             R, t = true_link_pose(cell.robot, link, q)
-            P = built_pose(motion.control_points.reshape(-1, 12), motion.weights, tau)
+            P = built_pose(motion.control_points.reshape(-1, 12), scaled, tau)
             for v in given.vertices:
                 x = matrix(v[:, None])
                 homogeneous = arb_mat([[x[0, 0]], [x[1, 0]], [x[2, 0]], [1]])

@@ -1,4 +1,4 @@
-"""The rational motion against independent kinematics: the true point lies inside the bound."""
+"""The rational motion of a link against independent kinematics: the true point lies inside the bound."""
 
 from bench_data import BENCH, cases, ROBOTS, workcell
 import numpy as np
@@ -8,7 +8,7 @@ from random_robot import core, link_poses, random_path, random_workcell
 
 from trajectory_guard.errors import RequestError
 from trajectory_guard.joint_path import joint_path
-from trajectory_guard.motion import Builder, rational_motion
+from trajectory_guard.link_motion import Builder, rational_motion
 
 # scipy's and pinocchio's own rounding, next to metres.
 JUDGE = 1e-14
@@ -47,7 +47,9 @@ def test_bound_contains_pinocchio_on_real_robots(robot, builder):
                 pinocchio.framesForwardKinematics(model, data, q)
                 true = data.oMf[model.getFrameId(link)].homogeneous
                 vertices = cell.robot.bodies(link)[0].vertices
-                off = distance(true, motion.pose(tau), cell.tree.link_pose[link], vertices)
+                off = distance(
+                    true, motion.pose(0.5 * (1.0 + tau)), cell.tree.link_pose[link], vertices
+                )
                 assert off <= motion.error + JUDGE
                 tightest = max(tightest, off / motion.error)
     assert tightest > 0.1  # a bound that is never approached would hide a wrong unit
@@ -80,11 +82,14 @@ def test_bound_contains_any_robot(seed, spread, builder):
             q = (path.coefficients[segment] * place(level, numerator, tau) ** np.arange(6)).sum(1)
             true = link_poses(cell.robot, q)[link]
             scale = 1.0 + np.abs(q).max()
-            assert distance(true, motion.pose(tau), T, points) <= motion.error + JUDGE * scale
+            assert (
+                distance(true, motion.pose(0.5 * (1.0 + tau)), T, points)
+                <= motion.error + JUDGE * scale
+            )
             off = q + slack * rng.choice([-1.0, 0.3, 1.0], len(q))
             followed = link_poses(cell.robot, off)[link]
             bound = motion.error + motion.inflation + JUDGE * scale
-            assert distance(followed, motion.pose(tau), T, points) <= bound
+            assert distance(followed, motion.pose(0.5 * (1.0 + tau)), T, points) <= bound
             middle = true if middle is None else middle
             moved = points @ (true - middle)[:3, :3].T + (true - middle)[:3, 3]
             assert np.linalg.norm(moved, axis=1).max() <= motion.sweep + JUDGE * scale
@@ -121,7 +126,7 @@ def test_rational_rotation_is_exactly_a_rotation():
     body = int(np.flatnonzero(cell.link_nodes >= 0)[-1])
     motion = rational_motion(cell, path, body, 0)
     for tau in np.linspace(-1.0, 1.0, 7):
-        R = motion.pose(tau)[:, :3]
+        R = motion.pose(0.5 * (1.0 + tau))[:, :3]
         np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-12)
 
 
