@@ -271,7 +271,9 @@ int64_t call_layout(char* text, int64_t room) {
 #define VALUE(name) say(#name, (long long)(name))
 #define FIELD(type, field) say(#type "." #field, (long long)offsetof(type, field))
 #define SIZE(type) say(#type, (long long)sizeof(type))
-  VALUE(REVOLUTE), VALUE(PRISMATIC), VALUE(TERMS), VALUE(LANES);
+  VALUE(REVOLUTE), VALUE(PRISMATIC), VALUE(TRANSLATION), VALUE(ROTATION);
+  VALUE(TERMS), VALUE(LANES);
+  VALUE(TURN_ERROR), VALUE(SHIFT_ERROR), VALUE(STRETCH), VALUE(RIGID);
   VALUE(guard::FIRST), VALUE(guard::LAST), VALUE(FACE_FIRST), VALUE(FACE_LAST);
   VALUE(guard::NODE), VALUE(RANGES);
   VALUE(BALL), VALUE(DISC), VALUE(CORE), VALUE(FAR), VALUE(SIZES);
@@ -308,6 +310,10 @@ int64_t call_layout(char* text, int64_t room) {
   FIELD(Boxes, bounds), FIELD(Boxes, branch), FIELD(Boxes, far);
   SIZE(Path);
   FIELD(Path, segments), FIELD(Path, coefficients), FIELD(Path, rounding), FIELD(Path, slack);
+  FIELD(Path, floating);
+  SIZE(Floating);
+  FIELD(Floating, first), FIELD(Floating, control), FIELD(Floating, weight);
+  FIELD(Floating, bounds);
   SIZE(Extents);
   FIELD(Extents, extent), FIELD(Extents, perpendicular), FIELD(Extents, offsets);
   SIZE(Request);

@@ -26,6 +26,7 @@ STRUCTURES = {
     'Solids': layout._Solids,
     'Boxes': layout._Boxes,
     'Path': layout.PathStructure,
+    'Floating': layout._Floating,
     'Extents': layout._Extents,
     'Request': layout.Request,
     'Answer': layout.Answer,

@@ -161,7 +161,11 @@ def poisoned(parts, bad):
     for part, value in parts.items():
         for field in value._fields:
             array = getattr(value, field)
-            if array.dtype != np.float64 or (bad == -math.inf and (part, field) in LENGTHS):
+            if (
+                array is None
+                or array.dtype != np.float64
+                or (bad == -math.inf and (part, field) in LENGTHS)
+            ):
                 continue
             if math.isinf(bad) and field == 'vertices':  # a corner at infinity is another solid
                 continue

@@ -167,12 +167,55 @@ def test_nothing_solid_may_hang_on_a_joint_without_a_place() -> None:
     assert found.joints == ()
 
 
-@pytest.mark.parametrize('type_', ['floating', 'planar'])
-def test_solids_below_such_a_joint_are_refused(type_: str) -> None:
-    with pytest.raises(RobotError, match=f"joint 'j': a {type_} joint") as caught:
+def test_solids_below_a_planar_joint_are_refused() -> None:
+    parts = (link('a'), link('b', ''), link('c'), joint(type_='planar'))
+    with pytest.raises(RobotError, match="joint 'j': a planar joint") as caught:
+        robot(*parts, joint('k', 'fixed', 'b', 'c'))
+    assert caught.value.reason is Reason.JOINT_UNSUPPORTED
+
+
+def test_a_floating_joint_is_a_translation_and_a_rotation() -> None:
+    parts = (link('a'), link('b', ''), link('c'), joint(type_='floating'))
+    found = robot(*parts, joint('k', 'continuous', 'b', 'c'))
+    assert found.floating == 'j'
+    assert [(joint.name, joint.type) for joint in found.joints] == [
+        ('j/translation', JointType.TRANSLATION),
+        ('j/rotation', JointType.ROTATION),
+        ('k', JointType.CONTINUOUS),
+    ]
+    assert found.links == ('a', 'b/translation', 'b', 'c')
+
+
+@pytest.mark.parametrize(
+    'joints',
+    [
+        (joint(type_='continuous'), joint('k', 'floating', 'b', 'c')),
+        (joint(type_='floating'), joint('k', 'floating', 'b', 'c')),
+        (joint(type_='floating'), joint('k', 'floating', 'a', 'c')),
+    ],
+    ids=['below a joint', 'below another', 'beside another'],
+)
+def test_one_floating_joint_at_the_root_is_all(joints: tuple[str, str]) -> None:
+    with pytest.raises(RobotError, match="joint 'k': a floating joint") as caught:
+        robot(link('a'), link('b'), link('c'), *joints)
+    assert caught.value.reason is Reason.JOINT_UNSUPPORTED
+
+
+def test_names_of_a_floating_joints_parts_are_taken() -> None:
+    with pytest.raises(RobotError, match="'j/rotation' is the name of a floating"):
         robot(
-            link('a'), link('b', ''), link('c'), joint(type_=type_), joint('k', 'fixed', 'b', 'c')
+            link('a'),
+            link('b'),
+            link('c'),
+            joint(type_='floating'),
+            joint('j/rotation', 'fixed', 'b', 'c'),
         )
+
+
+@pytest.mark.parametrize('type_', ['translation', 'rotation', 'ball'])
+def test_other_joint_types_are_refused(type_: str) -> None:
+    with pytest.raises(RobotError, match=f'joint type {type_!r}') as caught:
+        robot(link('a'), link('b'), joint(type_=type_))
     assert caught.value.reason is Reason.JOINT_UNSUPPORTED
 
 

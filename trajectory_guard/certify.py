@@ -11,7 +11,9 @@ import numpy as np
 from trajectory_guard.certificate import certificate
 from trajectory_guard.deadline import stop_flag
 from trajectory_guard.errors import Reason, TrajectoryGuardError
-from trajectory_guard.joint_path import INTERPOLATION, joint_path, JointPath
+from trajectory_guard.floating_path import floating_path
+from trajectory_guard.free_path import FreePath
+from trajectory_guard.joint_path import joint_path, JointPath
 from trajectory_guard.kernels.cover import cover_all, Covered, Question
 from trajectory_guard.kernels.layout import KernelRefused, Path
 from trajectory_guard.request import check_joints, motion_path, refusal, tracking_slack
@@ -44,7 +46,7 @@ class _Answer(NamedTuple):
 
 def certify(
     workcell: Workcell,
-    path: JointPath,
+    path: JointPath | FreePath,
     settings: Settings | None = None,
     slack: np.ndarray | None = None,
 ) -> Result:
@@ -52,7 +54,8 @@ def certify(
     Certify a joint path against the scene of a workcell.
 
     :param workcell: robot and scene.
-    :param path: the motion of every movable joint of that robot.
+    :param path: the motion of every movable joint of that robot; of a free body, or a robot of
+        which nothing but the floating joint can move, that joint's motion is enough.
     :param settings: what is asked; the defaults if None. A certificate speaks of a trajectory, so
         only `judge` writes one.
     :param slack: (n,) tracking tolerance per movable joint [rad or m]; None: the one value
@@ -62,9 +65,11 @@ def certify(
     """
     begin = time.perf_counter()
     settings = settings or Settings()
+    if isinstance(path, FreePath):
+        path = floating_path(workcell.robot, path)
     check_joints(workcell.robot.movable, path)
     if slack is None:
-        slack = tracking_slack(workcell.robot.movable, path, (), settings)
+        slack = tracking_slack(workcell.robot.movable, path, _moved(path), settings)
     job = _job(workcell, path, slack, begin)
     (covered,) = _cover(workcell, [job], settings)
     return _answer(workcell, job, covered, settings).result
@@ -157,6 +162,13 @@ def _job_of(
     )
 
 
+def _moved(path: JointPath) -> tuple[str, ...]:
+    """Return the parts of the floating joint, the order of two tracking tolerances."""
+    if path.floating is None:
+        return ()
+    return tuple(name for name, moves in zip(path.joint_names, path.in_path, strict=True) if moves)
+
+
 def _job(workcell: Workcell, path: JointPath, slack: np.ndarray, begin: float) -> _Job:
     pairs = workcell.pairs(path.in_path)
     motion = motion_path(workcell, path, slack)
@@ -218,7 +230,7 @@ def _answer(
         intervals=rows,
         tolerance=settings.tolerance,
         clearance=settings.clearance,
-        interpolation=INTERPOLATION,
+        interpolation=path.interpolation,
         robot_hash=workcell.robot_hash,
         scene_hash=workcell.scene_hash,
         compute_time=job.seconds + covered.seconds + time.perf_counter() - begin,

@@ -11,10 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from trajectory_guard.errors import Reason, RequestError, RobotError, TrajectoryError
+from trajectory_guard.free_path import FreePath
 from trajectory_guard.hermite import hermite, Knots
 from trajectory_guard.joint_limits import limit_excess
 from trajectory_guard.mimic import follow, followers
-from trajectory_guard.robot import Joint, JointType
+from trajectory_guard.robot import FLOATING_TYPES, Joint, JointType
 from trajectory_guard.start_state import with_start
 from trajectory_guard.trajectory import JointState, Trajectory
 
@@ -42,6 +43,8 @@ class JointPath:
         for the value at every s as well [rad or m].
     :param unknown_until_ns: before this time no start state tells where the arm is [ns].
     :param limits_checked: whether the joint limits were enforced.
+    :param floating: the motion of the robot's floating joint, segment by segment; None: it has
+        none. The coefficients of its two parts are 0.
     :raises RequestError: an array has another shape, or knots do not rise.
     """
 
@@ -52,6 +55,7 @@ class JointPath:
     coefficient_error: np.ndarray
     unknown_until_ns: int
     limits_checked: bool
+    floating: FreePath | None = None
 
     def __post_init__(self) -> None:
         """Check the shapes, which kernels take on trust, and make the arrays read-only."""
@@ -70,11 +74,21 @@ class JointPath:
                 )
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+        if self.floating is not None and len(self.floating.motions) != segments:
+            raise RequestError(
+                Reason.INVALID_PARAMETER,
+                f'floating has {len(self.floating.motions)} segments, the path {segments}',
+            )
         knots = self.knots_ns
         # Without length only a pose is a segment: what happens in no time has no interval.
         rises = knots[1:] > knots[:-1] if segments > 1 else knots[1:] >= knots[:-1]
         if not rises.all() or knots[0] < 0:
             raise RequestError(Reason.UNSORTED_TIMES, f'knots_ns must rise, got {self.knots_ns}')
+
+    @property
+    def interpolation(self) -> str:
+        """The rule that made the curve."""
+        return INTERPOLATION if self.floating is None else self.floating.interpolation
 
     @property
     def duration_ns(self) -> int:
@@ -266,6 +280,10 @@ def _check_names(robot_joints: Sequence[Joint], names: Sequence[str]) -> None:
             raise TrajectoryError(
                 Reason.UNKNOWN_JOINT,
                 f'the robot has no joint {name!r}; it has ' + ', '.join(map(repr, free)),
+            )
+        if joint.type in FLOATING_TYPES:
+            raise TrajectoryError(
+                Reason.JOINT_UNSUPPORTED, f'joint {name!r} is a part of a floating joint'
             )
         if joint.type is JointType.FIXED:
             raise TrajectoryError(Reason.FIXED_JOINT, f'joint {name!r} is fixed')

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.floating import floating
 from trajectory_guard.joint_path import JointPath
 from trajectory_guard.kernels.layout import Path
 from trajectory_guard.robot import Joint
@@ -81,15 +82,24 @@ def motion_path(workcell: Workcell, path: JointPath, slack: np.ndarray) -> Path:
     :param workcell: robot and scene.
     :param path: the motion of every movable joint of that robot.
     :param slack: (n,) tracking tolerance per movable joint [rad or m].
-    :raises RequestError: the tolerance has another shape or type.
+    :raises RequestError: the tolerance has another shape or type, the robot has a floating joint
+        and the path does not move it, or it moves it as kernels cannot take.
     """
+    if (workcell.robot.floating is None) != (path.floating is None):
+        raise RequestError(
+            Reason.JOINT_POSITION_UNKNOWN,
+            f'the path says nothing of the floating joint {workcell.robot.floating!r}'
+            if path.floating is None
+            else f'robot {workcell.robot.name!r} has no floating joint',
+        )
     joints = len(workcell.robot.movable)
     if slack.shape != (joints,) or slack.dtype != np.float64 or not slack.flags.c_contiguous:
         raise RequestError(
             Reason.INVALID_TRACKING_TOLERANCE,
             f'slack must be {joints} doubles, got {slack.dtype} of shape {slack.shape}',
         )
-    return Path(path.coefficients, path.coefficient_error, slack)
+    curves = None if path.floating is None else floating(path.floating)
+    return Path(path.coefficients, path.coefficient_error, slack, curves)
 
 
 def refusal(path: JointPath, slack: np.ndarray) -> RequestError | None:

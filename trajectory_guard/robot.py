@@ -4,12 +4,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 import hashlib
+import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from trajectory_guard.body import ConvexBody, read_only
 from trajectory_guard.errors import Reason, RobotError
+
+# What the two parts of a floating joint are called after it.
+TRANSLATION_SUFFIX = '/translation'
+ROTATION_SUFFIX = '/rotation'
 
 
 class JointType(Enum):
@@ -19,6 +24,12 @@ class JointType(Enum):
     CONTINUOUS = 'continuous'
     PRISMATIC = 'prismatic'
     FIXED = 'fixed'
+    # A floating joint is two: its child link translates, and below that rotates, in any direction.
+    TRANSLATION = 'translation'
+    ROTATION = 'rotation'
+
+
+FLOATING_TYPES = (JointType.TRANSLATION, JointType.ROTATION)
 
 
 class Mimic(NamedTuple):
@@ -41,7 +52,7 @@ class Joint:
     A joint of the tree: T_parent_child(q) = T_parent_joint * motion(q).
 
     The motion turns about the axis (q in rad) or slides along it (q in m); both through the
-    joint's origin.
+    joint's origin. The two parts of a floating joint have no axis and no position of their own.
 
     :param name: unique in the robot.
     :param type: kind of the motion.
@@ -69,6 +80,27 @@ class Joint:
         """Make the arrays read-only."""
         object.__setattr__(self, 'T_parent_joint', read_only(self.T_parent_joint))
         object.__setattr__(self, 'axis', read_only(self.axis))
+
+
+def floating_joint(name: str, parent: str, child: str, T: np.ndarray) -> tuple[Joint, Joint]:
+    """
+    Return the two parts of a floating joint, which a link that is nowhere in the robot joins.
+
+    :param name: the floating joint's.
+    :param parent: parent link, which no joint moves.
+    :param child: child link.
+    :param T: pose of the joint frame in the parent link, (4, 4) [m].
+    """
+
+    def part(suffix: str, type_: JointType, above: str, below: str, pose: np.ndarray) -> Joint:
+        z = np.array([0.0, 0.0, 1.0])
+        return Joint(name + suffix, type_, above, below, pose, z, -math.inf, math.inf)
+
+    between = child + TRANSLATION_SUFFIX
+    return (
+        part(TRANSLATION_SUFFIX, JointType.TRANSLATION, parent, between, T),
+        part(ROTATION_SUFFIX, JointType.ROTATION, between, child, np.eye(4)),
+    )
 
 
 class Loaded(NamedTuple):
@@ -133,6 +165,14 @@ class Robot:
         """List the movable joints, which every request asks for."""
         movable = tuple(joint for joint in self.joints if joint.type is not JointType.FIXED)
         object.__setattr__(self, 'movable', movable)
+
+    @property
+    def floating(self) -> str | None:
+        """The name of the floating joint, if there is one."""
+        for joint in self.joints:
+            if joint.type is JointType.TRANSLATION:
+                return joint.name.removesuffix(TRANSLATION_SUFFIX)
+        return None
 
     @property
     def links(self) -> tuple[str, ...]:

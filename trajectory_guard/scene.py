@@ -118,7 +118,8 @@ def _bodies_in_root(robot: Robot) -> dict[str, tuple[ConvexBody, ...]]:
     for joint in robot.movable:
         raise SceneError(
             Reason.SCENE_INVALID,
-            f'scene {robot.name!r}: joint {joint.name!r} can move; obstacles must be fixed',
+            f'scene {robot.name!r}: joint {(robot.floating or joint.name)!r} can move; '
+            'obstacles must be fixed',
         )
     above = {joint.child: joint for joint in robot.joints}
     found = {}

@@ -5,8 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajectory_guard.body import rigid_defect, RIGID_TOLERANCE
-from trajectory_guard.kernels.layout import Chain, PRISMATIC, REVOLUTE
+from trajectory_guard.kernels.layout import Chain, PRISMATIC, REVOLUTE, ROTATION, TRANSLATION
 from trajectory_guard.robot import Joint, JointType, Robot
+
+_KIND = {
+    JointType.REVOLUTE: REVOLUTE,
+    JointType.CONTINUOUS: REVOLUTE,
+    JointType.PRISMATIC: PRISMATIC,
+    JointType.TRANSLATION: TRANSLATION,
+    JointType.ROTATION: ROTATION,
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +65,7 @@ def tree(robot: Robot) -> Tree:
             node[joint.child] = len(parent)
             pose[joint.child] = align.T
             parent.append(node[joint.parent])
-            kind.append(PRISMATIC if joint.type is JointType.PRISMATIC else REVOLUTE)
+            kind.append(_KIND[joint.type])
             transform.append(_rigid(above @ align)[:3].ravel())
             steps[joint.child] += 1
         carrier = node[joint.child]

@@ -14,11 +14,13 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from trajectory_guard.errors import Reason, RobotError
-from trajectory_guard.robot import Collision, Joint, JointType, Mimic, Robot
-from trajectory_guard.urdf_elements import attribute, collision_of, joint_of, link_of
+from trajectory_guard.robot import Collision, floating_joint, Joint, JointType, Mimic, Robot
+from trajectory_guard.urdf_elements import attribute, collision_of, joint_of, link_of, origin_of
 
-# Joint types with more than one degree of freedom; nothing says where such a link is.
-UNDETERMINED = ('floating', 'planar')
+# Joint types with more than one degree of freedom.
+FLOATING = 'floating'
+PLAIN = ('revolute', 'continuous', 'prismatic', 'fixed')
+UNDETERMINED = (FLOATING, 'planar')
 
 
 def load_robot(path: str | Path) -> Robot:
@@ -138,10 +140,11 @@ def _tree(links: dict[str, Element], joints: dict[str, Element]) -> tuple[str, l
 
 def _determined(elements: list[Element], base: str, solid: set[str]) -> list[Joint]:
     """
-    Return the joints whose pose is known, in the order given.
+    Return the joints whose pose is known or can be told, in the order given.
 
-    A link behind a floating or planar joint is nowhere in particular. If nothing solid hangs
-    there, it is left out with all that follows it.
+    A floating joint above collision geometry hangs on the root, and there is one at most: a
+    message can say where its child is. Where nothing solid hangs on a floating or planar joint, it
+    is left out with all that follows it.
 
     :param elements: joints in topological order.
     :param base: root link.
@@ -151,31 +154,59 @@ def _determined(elements: list[Element], base: str, solid: set[str]) -> list[Joi
     for element in reversed(elements):
         if link_of(element, 'child') in carries:
             carries.add(link_of(element, 'parent'))
-    known = {base}
+    known, still = {base}, {base}
     joints: list[Joint] = []
     for element in elements:
         parent, child = link_of(element, 'parent'), link_of(element, 'child')
         with _about(f'joint {element.get("name")!r}'):
             type_ = attribute(element, 'type')
-            if type_ in UNDETERMINED:
-                if child in carries:
-                    raise RobotError(
-                        Reason.JOINT_UNSUPPORTED,
-                        f'a {type_} joint above collision geometry is not supported',
-                    )
+            if type_ in UNDETERMINED and child not in carries:
+                continue
+            if type_ == FLOATING:
+                joints += _floating(element, still, joints)
+            elif type_ in UNDETERMINED:
+                raise RobotError(
+                    Reason.JOINT_UNSUPPORTED,
+                    f'a {type_} joint above collision geometry is not supported',
+                )
             elif parent in known:
                 joints.append(joint_of(element, _joint_type(type_)))
-                known.add(child)
+            else:
+                continue
+            known.add(child)
+            if joints[-1].type is JointType.FIXED and parent in still:
+                still.add(child)
+    _check_names(joints)
     return joints
 
 
-def _joint_type(text: str) -> JointType:
-    try:
-        return JointType(text)
-    except ValueError:
+def _check_names(joints: list[Joint]) -> None:
+    """Refuse names that those of a floating joint's parts repeat."""
+    for names in ([joint.name for joint in joints], [joint.child for joint in joints]):
+        for name in names:
+            if names.count(name) > 1:
+                raise RobotError(
+                    Reason.ROBOT_INVALID, f'{name!r} is the name of a floating joint part, too'
+                )
+
+
+def _floating(element: Element, still: set[str], before: list[Joint]) -> tuple[Joint, Joint]:
+    """Return the parts of a floating joint, if it is the only one and hangs on the root."""
+    parent = link_of(element, 'parent')
+    if parent not in still or any(joint.type is JointType.TRANSLATION for joint in before):
         raise RobotError(
-            Reason.JOINT_UNSUPPORTED, f'joint type {text!r} is not supported'
-        ) from None
+            Reason.JOINT_UNSUPPORTED,
+            'a floating joint above collision geometry must be the only one, and no joint may '
+            'move its parent',
+        )
+    name = attribute(element, 'name')
+    return floating_joint(name, parent, link_of(element, 'child'), origin_of(element))
+
+
+def _joint_type(text: str) -> JointType:
+    if text not in PLAIN:
+        raise RobotError(Reason.JOINT_UNSUPPORTED, f'joint type {text!r} is not supported')
+    return JointType(text)
 
 
 def _with_resolved_mimics(joints: list[Joint]) -> tuple[Joint, ...]:

@@ -31,7 +31,7 @@ def joint_of(element: Element, type_: JointType) -> Joint:
         type=type_,
         parent=link_of(element, 'parent'),
         child=link_of(element, 'child'),
-        T_parent_joint=_origin(element),
+        T_parent_joint=origin_of(element),
         # Exporters write an axis of zeros to fixed joints; it means nothing there.
         axis=np.array([1.0, 0.0, 0.0]) if fixed else _axis(element),
         lower=0.0 if fixed else lower,
@@ -58,7 +58,24 @@ def collision_of(element: Element, folder: Path | None) -> Collision:
         raise RobotError(
             Reason.ROBOT_INVALID, 'a <collision> needs one <geometry> with one shape in it'
         )
-    return Collision(_origin(element), _shape(geometry[0], folder))
+    return Collision(origin_of(element), _shape(geometry[0], folder))
+
+
+def origin_of(element: Element) -> np.ndarray:
+    """Return the pose of an `<origin>`: R = Rz(yaw) Ry(pitch) Rx(roll), the identity if absent."""
+    origin = only(element, 'origin')
+    if origin is None:
+        return np.eye(4)
+    unknown = set(origin.keys()) - {'xyz', 'rpy'}
+    if unknown:
+        raise RobotError(
+            Reason.ROBOT_INVALID, f'<origin> has unknown attributes {sorted(unknown)}'
+        )
+    xyz = _numbers(origin, 'xyz', 3, (0.0, 0.0, 0.0))
+    rpy = _numbers(origin, 'rpy', 3, (0.0, 0.0, 0.0))
+    if not max(map(abs, xyz)) <= LARGEST_COORDINATE or not max(map(abs, rpy)) < math.inf:
+        raise RobotError(Reason.ROBOT_INVALID, f'<origin> is out of range: {xyz} {rpy}')
+    return pose_matrix(xyz, rpy)
 
 
 def only(element: Element, tag: str) -> Element | None:
@@ -94,23 +111,6 @@ def _numbers(
             Reason.ROBOT_INVALID, f'<{element.tag}> {name} must be {count} numbers, got {text!r}'
         )
     return values
-
-
-def _origin(element: Element) -> np.ndarray:
-    """Return the pose of an `<origin>`: R = Rz(yaw) Ry(pitch) Rx(roll), the identity if absent."""
-    origin = only(element, 'origin')
-    if origin is None:
-        return np.eye(4)
-    unknown = set(origin.keys()) - {'xyz', 'rpy'}
-    if unknown:
-        raise RobotError(
-            Reason.ROBOT_INVALID, f'<origin> has unknown attributes {sorted(unknown)}'
-        )
-    xyz = _numbers(origin, 'xyz', 3, (0.0, 0.0, 0.0))
-    rpy = _numbers(origin, 'rpy', 3, (0.0, 0.0, 0.0))
-    if not max(map(abs, xyz)) <= LARGEST_COORDINATE or not max(map(abs, rpy)) < math.inf:
-        raise RobotError(Reason.ROBOT_INVALID, f'<origin> is out of range: {xyz} {rpy}')
-    return pose_matrix(xyz, rpy)
 
 
 def _axis(element: Element) -> np.ndarray:

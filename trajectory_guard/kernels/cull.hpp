@@ -16,8 +16,8 @@ constexpr double WORTH = 0.05;
 // What a sphere's distance to a box must exceed, without the motion itself [m].
 inline double taken(const Solids& links, int64_t b, const Solids& obstacles, int64_t o,
                     double clearance, const Body& body) {
-  return links.length(b, CORE) + links.length(b, BALL) + obstacles.length(o, BALL) + body.slack +
-         clearance + sphere_margin(body.reach, obstacles.length(o, FAR));
+  return links.length(b, CORE) + links.length(b, BALL) + body.grown + obstacles.length(o, BALL) +
+         body.slack + clearance + sphere_margin(body.reach, obstacles.length(o, FAR));
 }
 
 // Say whether the sphere at the centre keeps clear while the body sweeps.
@@ -56,8 +56,8 @@ inline bool moving_clear(Motion& motion, int64_t b, const Solids& obstacles, int
 template <class Open>
 inline void scan(const Solids& links, int64_t b, const Boxes& boxes, double clearance, Body& body,
                  Open open) {
-  double base = links.length(b, CORE) + links.length(b, BALL) + body.slack + clearance +
-                body.sweep + body.fuzz;
+  double base = links.length(b, CORE) + links.length(b, BALL) + body.grown + body.slack +
+                clearance + body.sweep + body.fuzz;
   double whole = (base + sphere_margin(body.reach, boxes.far)) * UP;
   double square = whole * whole * UP;
   int64_t stack[64];

@@ -8,6 +8,8 @@ import numpy as np
 # Kinds of joints.
 REVOLUTE = 0
 PRISMATIC = 1
+TRANSLATION = 2
+ROTATION = 3
 
 TERMS = 6  # coefficients of a quintic
 LANES = 8
@@ -16,6 +18,8 @@ LANES = 8
 FIRST, LAST, FACE_FIRST, FACE_LAST, NODE = range(5)
 # Columns of `Solids.size` [m]: ball, disc, sphere around vertices and disc, farthest point.
 BALL, DISC, CORE, FAR = range(4)
+# Columns of `Floating.bounds`.
+TURN_ERROR, SHIFT_ERROR, STRETCH, RIGID = range(4)
 # Columns of `Solids.place`: disc normal, sphere centre, box half sides, pose of the box (12).
 AXIS, CENTRE, HALF, BOX = 0, 3, 6, 9
 
@@ -52,7 +56,8 @@ class Chain(NamedTuple):
     The movable joints of a robot.
 
     :param parent: (n,) int64 node above, -1 for the root; parents come before children.
-    :param kind: (n,) int64, REVOLUTE or PRISMATIC.
+    :param kind: (n,) int64, REVOLUTE, PRISMATIC, TRANSLATION or ROTATION; a floating joint is a
+        translation and below it a rotation.
     :param transform: (n, 12) rows of [R | t]: constant pose of the node, before its own motion, in
         its parent node's frame [m].
     :param depth: (n,) int64 number of rounded transforms from the root down to this node.
@@ -117,6 +122,24 @@ class Extents(NamedTuple):
     offsets: np.ndarray
 
 
+class Floating(NamedTuple):
+    """
+    The motion of the floating joint, one rational Bezier curve of displacements per segment.
+
+    :param first: (S + 1,) int64 first control point of each segment, and the end.
+    :param control: (P, 16) displacements by columns of 4, the fourth entries zero [m].
+    :param weight: (P,) positive.
+    :param bounds: (S, 4): the truth is off the curve at a point x by at most SHIFT_ERROR +
+        TURN_ERROR |x| [m]; the norm of the linear part is at most 1 + STRETCH; RIGID, 1 or 0: it
+        is a rotation within STRETCH.
+    """
+
+    first: np.ndarray
+    control: np.ndarray
+    weight: np.ndarray
+    bounds: np.ndarray
+
+
 class Path(NamedTuple):
     """
     The joint path of a request, joints in node order.
@@ -124,11 +147,13 @@ class Path(NamedTuple):
     :param coefficients: (S, n, 6) powers of s on [0, 1] of each segment [rad or m].
     :param rounding: (S, n) bound on the error of the coefficients together [rad or m].
     :param slack: (n,) tracking tolerance [rad or m].
+    :param floating: motion of the floating joint, if the robot has one.
     """
 
     coefficients: np.ndarray
     rounding: np.ndarray
     slack: np.ndarray
+    floating: Floating | None = None
 
 
 _P = ctypes.c_void_p
@@ -155,7 +180,15 @@ _Solids = _structure(
 _Boxes = _structure(
     'Boxes', blocks=_I, box=_P, obstacle=_P, nodes=_I, bounds=_P, branch=_P, far=_D
 )
-PathStructure = _structure('Path', segments=_I, coefficients=_P, rounding=_P, slack=_P)
+_Floating = _structure('Floating', first=_P, control=_P, weight=_P, bounds=_P)
+PathStructure = _structure(
+    'Path',
+    segments=_I,
+    coefficients=_P,
+    rounding=_P,
+    slack=_P,
+    floating=ctypes.POINTER(_Floating),
+)
 _Extents = _structure('Extents', extent=_P, perpendicular=_P, offsets=_P)
 Request = _structure(
     'Request',
@@ -271,4 +304,14 @@ def path_structure(path: Path) -> ctypes.Structure:
         _checked(path.coefficients, float),
         _checked(path.rounding, float),
         _checked(path.slack, float),
+        None if path.floating is None else ctypes.pointer(_floating(path.floating)),
+    )
+
+
+def _floating(floating: Floating) -> ctypes.Structure:
+    return _Floating(
+        _checked(floating.first, np.int64),
+        _checked(floating.control, float),
+        _checked(floating.weight, float),
+        _checked(floating.bounds, float),
     )

@@ -6,6 +6,7 @@
 
 #include <vector>
 
+#include "floating.hpp"
 #include "piece.hpp"
 #include "reach.hpp"
 #include "separation.hpp"
@@ -35,6 +36,7 @@ struct Body {
   double fuzz;        // error of the centre pose
   double place[3];    // sphere's centre at the piece's centre
   double nearest;     // least distance of that place to a box
+  double grown;       // how far an affine motion may stretch the sphere beyond its radius
   double error;       // of the built motion, without tracking and rounding; negative: not yet known
   double radius;      // of the control points of the sphere's centre; negative: not yet known
   int64_t stands_on;  // number of the piece that the columns above belong to
@@ -49,6 +51,10 @@ struct Motion {
   std::vector<Body>& bodies;
   // (B, padded) lever arms; rows of `padded`: chord, span, fuzz and fit of the joints.
   std::vector<double>&rho, &chord, &span, &fuzz, &fit;
+  FloatingPiece floating{};       // of the floating joint on the piece
+  const double* given = nullptr;  // bounds of its segment
+  double stretched = 0.0;         // see `stretch`
+  double farthest_out = 0.0;      // bound on its translation [m]
 
   const double* arms(int64_t b) const { return rho.data() + b * padded; }
 
@@ -57,6 +63,11 @@ struct Motion {
     std::vector<double> travel(chain.nodes);
     for (int64_t j = 0; j < chain.nodes; j++) {
       travel[j] = (size_of(path, chain.nodes, j) + path.slack[j]) * UP;
+      if (chain.kind[j] == TRANSLATION || chain.kind[j] == ROTATION) {
+        Parts size = path.floating ? size_of(*path.floating, path.segments) : Parts{NAN, NAN};
+        farthest_out = size.shift;
+        travel[j] = (chain.kind[j] == ROTATION ? size.turn : size.shift + travel[j]) * UP;
+      }
       if (!(travel[j] >= 0.0)) return false;
     }
     nodes.resize(chain.nodes);
@@ -77,8 +88,16 @@ struct Motion {
   }
 
   double chorded(int64_t j, double turn) const {
-    return chain.kind[j] == REVOLUTE && turn > FROZEN ? FROZEN : turn;
+    bool turns = chain.kind[j] == REVOLUTE || chain.kind[j] == ROTATION;
+    double most = FROZEN * (1.0 + stretch());
+    return turns && turn > most ? most : turn;
   }
+
+  // What an affine motion may add to the length of a vector of length 1 during the piece.
+  double stretch() const { return stretched; }
+
+  // Whether link and image are congruent, within what `stretch` allows.
+  bool rigid() const { return given == nullptr || given[RIGID] != 0.0; }
 
   void need_none() {
     for (int64_t j = 0; j < chain.nodes; j++) nodes[j].needed = false;
@@ -99,6 +118,10 @@ struct Motion {
         chord[j] = span[j] = fuzz[j] = 0.0;
         continue;
       }
+      if (chain.kind[j] == TRANSLATION || chain.kind[j] == ROTATION) {
+        centre_floating(piece, j);
+        continue;
+      }
       int64_t row = piece.segment * chain.nodes + j;
       Restricted r = restrict_to(path.coefficients + row * TERMS, m, h, node.d);
       span[j] = r.span;
@@ -110,6 +133,34 @@ struct Motion {
       else
         compose(nodes[chain.parent[j]].pose, node.local, node.pose);
     }
+  }
+
+  // The same for a part of the floating joint; its translation comes first.
+  void centre_floating(const Piece& piece, int64_t j) {
+    Node& node = nodes[j];
+    if (chain.kind[j] == TRANSLATION) {
+      given = path.floating->bounds + FLOATING_BOUNDS * piece.segment;
+      fit_floating(*path.floating, piece.segment, piece.centre(), piece.half(), floating);
+      turn(chain, j, 0.0, node.local);
+      double moved[POSE] = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0};
+      for (int r = 0; r < 3; r++) moved[12 + r] = floating.centre.zt[4 + r];
+      compose(node.local, moved, node.pose);
+      span[j] = floating.span.shift;
+      fuzz[j] = floating.fuzz.shift + given[SHIFT_ERROR];
+    } else {
+      store(node.local, floating.centre.xy);
+      store(node.local + LANES, floating.centre.zt);
+      for (int r = 12; r < POSE; r++) node.local[r] = 0.0;
+      compose(nodes[chain.parent[j]].pose, node.local, node.pose);
+      span[j] = floating.span.turn;
+      fuzz[j] = floating.fuzz.turn + given[TURN_ERROR];
+      stretched = given[STRETCH];
+      if (!rigid()) {
+        double norm = (spectral_norm(floating.centre) + span[j] + fuzz[j]) * UP;
+        stretched = norm < 1.0 + stretched ? std::fmax(norm - 1.0, 0.0) : stretched;
+      }
+    }
+    chord[j] = chorded(j, span[j]);
   }
 
   // Fill what the centre pose says of a body, once a piece.
@@ -129,6 +180,7 @@ struct Motion {
     body.linear = sum(linear) * UP;
     body.fuzz = (sum(off) + chain_margin(chain.depth[node], 1.0, body.reach)) * UP;
     image(nodes[node].pose, links.at(b, CENTRE), body.place);
+    body.grown = stretch() * (links.length(b, CORE) + links.length(b, BALL)) * UP;
     body.nearest = INFINITY;
     body.error = body.radius = -1.0;
     return body;
@@ -150,6 +202,10 @@ struct Motion {
     for (int64_t j = 0; j < chain.nodes; j++) {
       Node& node = nodes[j];
       if (!node.needed) continue;
+      if (chain.kind[j] == TRANSLATION || chain.kind[j] == ROTATION) {
+        build_floating(j);
+        continue;
+      }
       const Node* up = chain.parent[j] < 0 ? nullptr : &nodes[chain.parent[j]];
       double phi[TERMS] = {0.0, node.d[1], node.d[2], node.d[3], node.d[4], node.d[5]};
       node.growth =
@@ -157,6 +213,50 @@ struct Motion {
                  node.local, span[j], phi, node.cosine, node.sine, node.delta, node.polynomial);
       fit[j] = node.growth.fit;
     }
+  }
+
+  // Build a part of the floating joint: the fixed pose below the root times the polynomial.
+  //
+  // The bounds of `floating` hold for the polynomial as stored; what remains is the fixed pose, as
+  // for any node. A translation's coefficients may add up to more than its reach: kappa then says
+  // how much more.
+  void build_floating(int64_t j) {
+    Node& node = nodes[j];
+    bool slides = chain.kind[j] == TRANSLATION;
+    double fixed[POSE];
+    turn(chain, j, 0.0, fixed);
+    if (!slides) std::memcpy(fixed, nodes[chain.parent[j]].local, sizeof fixed);
+    double size = 0.0;
+    for (int k = 0; k < TERMS; k++) {
+      double* q = node.polynomial.power[k];
+      double power[POSE] = {};
+      if (slides) {
+        if (k == 0) power[0] = power[5] = power[10] = 1.0;
+        for (int r = 0; r < 3; r++) power[12 + r] = floating.power[k].zt[4 + r];
+      } else {
+        store(power, floating.power[k].xy);
+        store(power + LANES, floating.power[k].zt);
+        size += norms(floating.power[k]).turn;
+      }
+      compose(fixed, power, q);
+      if (!slides)
+        std::memcpy(q + 12, nodes[chain.parent[j]].polynomial.power[k] + 12, 3 * sizeof *q);
+      fixed[12] = fixed[13] = fixed[14] = 0.0;
+    }
+    Growth g{0.0, 0.0, 2.0, MAJORANT};
+    if (slides) {
+      g.fit = floating.fit.shift;
+      g.kappa = MAJORANT * std::fmax(1.0, floating.size.shift / farthest_out * UP);
+    } else {
+      g = nodes[chain.parent[j]].growth;
+      g.fit = floating.fit.turn;
+      g.eps = (g.fit + stretch()) * UP;
+      g.size = size * UP;
+      g.kappa = std::fmax(g.kappa, MAJORANT * std::fmax(g.size, floating.size.turn));
+    }
+    if (!(g.fit >= 0.0 && g.kappa >= 0.0)) g.fit = g.kappa = INFINITY;
+    node.growth = g;
+    fit[j] = g.fit;
   }
 
   // Fit the turns of up to eight joints, one in each lane.
@@ -182,14 +282,14 @@ struct Motion {
     Lanes total{};
     for (int64_t j = 0; j < padded; j += LANES)
       total += (load(fit.data() + j) + load(fuzz.data() + j)) * load(arms(b) + j);
-    return sum(total) * UP;
+    return (sum(total) + stretch() * links.length(b, BALL)) * UP;
   }
 
   // How far the joints above a body turn it in a piece, linear in its length [rad].
   double turned(int64_t b) const {
     double total = 0.0;
     for (int64_t j = links.range(b, NODE); j >= 0; j = chain.parent[j])
-      if (chain.kind[j] == REVOLUTE) total += span[j];
+      if (chain.kind[j] == REVOLUTE || chain.kind[j] == ROTATION) total += span[j];
     return total * UP;
   }
 

@@ -101,6 +101,9 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
   double margin = chain_margin(doubt.depth, doubt.kappa, doubt.reach) +
                   sphere_margin(doubt.reach, obstacles.length(o, FAR));
   double accuracy = ACCURACY * ask.tolerance;
+  // Depths are measured in the link; an image that is no congruent one has others.
+  bool rigid = motion.rigid();
+  double loose = 2.0 * motion.stretch() * (links.length(b, CORE) + links.length(b, BALL));
   known = Known{};
   known.lower = -INFINITY;
   known.upper = known.near = INFINITY;
@@ -120,7 +123,7 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
 
   bool deep_start = live.start.state == Instant::DEEP, deep_end = live.end.state == Instant::DEEP;
   auto moving = [&] {
-    return moving_witness(links, b, obstacles, o, node, doubt.error, margin, live.start.y,
+    return moving_witness(links, b, obstacles, o, node, doubt.error + loose, margin, live.start.y,
                           live.end.y, known);
   };
   if (node.sound && deep_start && deep_end && moving()) return Outcome::OVERLAPS;
@@ -137,8 +140,9 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
   Common common{};
   bool deep = false;
   auto stands = [&] {
-    bool whole = standing_witness(links, b, obstacles, o, node, doubt.error, body.fuzz, margin,
-                                  scratch, live.meeting, common, known);
+    if (!rigid) return false;
+    bool whole = standing_witness(links, b, obstacles, o, node, doubt.error + loose,
+                                  body.fuzz + loose, margin, scratch, live.meeting, common, known);
     deep = known.depth > 0.0;
     return whole;
   };
@@ -147,7 +151,9 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
   if (!deep) {
     Found state =
         gjk(n, Standing{node.pose}, links, b, obstacles, o, want, false, accuracy, ROUNDS, found);
-    known.upper = found.distance - balls + body.fuzz + margin;
+    // The ball of an image that is not congruent may have shrunk to nothing.
+    double shrunk = rigid ? loose : links.length(b, BALL);
+    known.upper = found.distance - balls + shrunk + body.fuzz + margin;
     for (int r = 0; r < 3; r++) known.place[r] = found.place[r];
     if (state != Found::OVERLAP) {
       if (found.best - balls > limit) live.centre.state = Instant::APART;
@@ -161,7 +167,7 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
         return Outcome::CLOSED;
       }
     }
-    if (!(known.upper <= body.fuzz + margin)) return Outcome::OPEN;
+    if (!(known.upper <= shrunk + body.fuzz + margin)) return Outcome::OPEN;
     if (!(deep_start || deep_end) && stands()) return Outcome::OVERLAPS;
   }
   if (node.sound && deep) {

@@ -141,6 +141,8 @@ inline RationalLink rational_link(const Motion& motion, int64_t b) {
   RationalLink link{{}, {}, 0.0, 1.0, true};
   for (int64_t j : way) {
     const Node& node = motion.nodes[j];
+    // A floating joint is a rational curve already, but of one degree per segment.
+    if (motion.chain.kind[j] > PRISMATIC) link.sound = false;
     size_t count = now.size() / ROW;
     std::vector<double> placed(now.size());
     for (size_t i = 0; i < count; i++) {

@@ -10,6 +10,10 @@
 // axis is at most the part of the next joint's origin perpendicular to the axis plus the lengths
 // of all later offsets and slides plus |x|. A body's ball is left out: it looks the same however
 // the body turns, so it stays where its centre is.
+//
+// A floating joint hangs on the root. Its translation is a slide in any direction; its rotation has
+// no axis, so the arm is the distance to its origin, and if its linear part may stretch by a factor
+// f, all that lies beyond is moved by f times as much.
 #pragma once
 
 #include <cmath>
@@ -21,16 +25,20 @@ namespace guard {
 
 // Write the lever arms of a body on all n joints (zero where the joint is not above it) [m, or 1
 // for a slide]; returns a bound on every length that enters the body's position [m]. travel: (n,)
-// bound on |q| of a slide, tolerance included [m].
+// bound on |q| of a slide, tolerance included [m]; the factor f of a rotation.
 inline double lever_arms(const Chain& chain, const double* travel, const Extents& extents,
                          int64_t b, int64_t node, double* rho) {
   // `far`: bound on the distance of the body's points to the origin of the node below j, `axis`:
   // the same to the axis of j.
   double far = extents.extent[b], axis = extents.perpendicular[b];
   for (int64_t j = node; j >= 0; j = chain.parent[j]) {
-    if (chain.kind[j] == PRISMATIC) {
+    if (chain.kind[j] == PRISMATIC || chain.kind[j] == TRANSLATION) {
       rho[j] = 1.0;
       far += travel[j];
+    } else if (chain.kind[j] == ROTATION) {
+      far *= travel[j];
+      rho[j] = far * UP;
+      for (int64_t k = node; k != j; k = chain.parent[k]) rho[k] *= travel[j] * UP;
     } else {
       rho[j] = axis * UP;
     }

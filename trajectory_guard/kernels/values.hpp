@@ -8,8 +8,8 @@
 
 namespace guard {
 
-// Kinds of joints.
-constexpr int64_t REVOLUTE = 0, PRISMATIC = 1;
+// Kinds of joints. A floating joint is a translation and below it a rotation.
+constexpr int64_t REVOLUTE = 0, PRISMATIC = 1, TRANSLATION = 2, ROTATION = 3;
 
 // Columns of Solids::ranges. Vertices and faces are padded to whole vectors with copies.
 enum { FIRST, LAST, FACE_FIRST, FACE_LAST, NODE, RANGES };
@@ -24,7 +24,7 @@ constexpr int TERMS = 6;  // coefficients of a quintic
 struct Chain {
   int64_t nodes;
   const int64_t* parent;    // (n,) node above, -1 for the root; parents come first
-  const int64_t* kind;      // (n,) REVOLUTE or PRISMATIC
+  const int64_t* kind;      // (n,) see above
   const double* transform;  // (n, 12) rows of [R | t]: the node before its motion, in its parent
   const int64_t* depth;     // (n,) rounded transforms between the root and the node
 };
@@ -61,12 +61,24 @@ struct Boxes {
   double far;             // the largest BOX_FAR
 };
 
+// The motion of the floating joint: a rational Bezier curve of displacements for each segment.
+struct Floating {
+  const int64_t* first;   // (S + 1,) first control point of each segment, and the end
+  const double* control;  // (P, 16) displacements by columns of 4, the fourth entries zero
+  const double* weight;   // (P,) positive
+  // (S, FLOATING_BOUNDS): |truth(x) - curve(x)| <= shift + turn |x|; the curve's linear part has
+  // norm at most 1 + stretch; rigid: it is a rotation within stretch, else any matrix.
+  const double* bounds;
+};
+enum { TURN_ERROR, SHIFT_ERROR, STRETCH, RIGID, FLOATING_BOUNDS };
+
 // The joint path of a request, joints in node order.
 struct Path {
   int64_t segments;
   const double* coefficients;  // (S, n, TERMS) powers of s on [0, 1] [rad or m]
   const double* rounding;      // (S, n) bound on the error of the coefficients together
   const double* slack;         // (n,) tracking tolerance [rad or m]
+  const Floating* floating;    // null if no joint floats
 };
 
 // No coordinate is larger, so that no product overflows [rad or m].

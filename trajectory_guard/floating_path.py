@@ -1,0 +1,67 @@
+"""A free path as the path of a robot: its floating joint moves, all other joints stand."""
+
+from collections.abc import Sequence
+import math
+
+import numpy as np
+
+from trajectory_guard.errors import Reason, TrajectoryError
+from trajectory_guard.free_path import FreePath
+from trajectory_guard.joint_path import JointPath
+from trajectory_guard.mimic import follow, followers
+from trajectory_guard.robot import FLOATING_TYPES, Joint, Robot
+from trajectory_guard.trajectory import JointState
+
+# A floating joint of this name is a bare body's: a message may call it what it wants.
+ANY_NAME = ''
+
+
+def floating_path(robot: Robot, free: FreePath, start: JointState | None = None) -> JointPath:
+    """
+    Return the path of all movable joints of a robot whose base moves.
+
+    :param robot: a robot with a floating joint.
+    :param free: the motion of that joint's child link in its parent link, the robot's root.
+    :param start: positions of the other movable joints, which they hold.
+    :raises TrajectoryError: the robot has no floating joint, or one of another name, or a joint's
+        position is unknown.
+    """
+    name = robot.floating
+    if name is None:
+        raise TrajectoryError(
+            Reason.UNKNOWN_JOINT, f'robot {robot.name!r} has no floating joint {free.joint_name!r}'
+        )
+    if name not in (ANY_NAME, free.joint_name):
+        raise TrajectoryError(
+            Reason.UNKNOWN_JOINT,
+            f'the robot has no floating joint {free.joint_name!r}; it has {name!r}',
+        )
+    joints = robot.movable
+    coefficients = np.zeros((len(free.motions), len(joints), 6))
+    error = np.zeros((len(free.motions), len(joints)))
+    coefficients[:, :, 0] = _held(joints, start)
+    for j, leader in followers(joints):
+        follow(coefficients, error, joints[j], j, leader)
+    return JointPath(
+        joint_names=tuple(joint.name for joint in joints),
+        in_path=np.array([joint.type in FLOATING_TYPES for joint in joints]),
+        knots_ns=free.knots_ns,
+        coefficients=coefficients,
+        coefficient_error=error,
+        unknown_until_ns=free.unknown_until_ns,
+        limits_checked=True,
+        floating=free,
+    )
+
+
+def _held(joints: Sequence[Joint], start: JointState | None) -> list[float]:
+    """Return where each joint stands; mimic joints and the floating one are left at 0."""
+    known = {} if start is None else dict(zip(start.joint_names, start.positions, strict=True))
+    asked = [j.name for j in joints if j.mimic is None and j.type not in FLOATING_TYPES]
+    unknown = [repr(name) for name in asked if not math.isfinite(known.get(name, math.nan))]
+    if unknown:
+        raise TrajectoryError(
+            Reason.JOINT_POSITION_UNKNOWN,
+            'neither the trajectory nor the start state gives ' + ', '.join(unknown),
+        )
+    return [float(known[joint.name]) if joint.name in asked else 0.0 for joint in joints]
