@@ -1,4 +1,4 @@
-"""The rational motion of a link against independent kinematics: the true point lies inside the bound."""
+"""The rational motion of a link against independent kinematics: the truth is inside the bound."""
 
 from bench_data import BENCH, cases, ROBOTS, workcell
 import numpy as np
