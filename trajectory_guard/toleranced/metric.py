@@ -293,7 +293,7 @@ class MassDistribution:
         Return upper bounds of the distortion rate at points, (...,).
 
         An entry of W (x - b) is three products, their sums and a difference: within 6 U of the
-        same with all numbers absolute. rho^2 <= 1/|mu| + s^2 |W y|^2 <= s^2 (1/|mu| + |W y|^2), s >= 1;
+        same with all numbers absolute. rho^2 <= s^2 (1/|mu| + |W y|^2), since s >= 1;
         division, squares, sums and the root add less than 8 U.
 
         :param x: (..., 3) [m].
