@@ -92,7 +92,8 @@ class FatEdge:
             )
         places = np.linspace(t[0], t[1], steps + 1)
         angles = np.linspace(0.0, 2.0 * math.pi, 4 * steps + 1)
-        frame = across(line.direction)
+        # Left-handed, so that the rows along the edge cross the circles counter-clockwise.
+        frame = across(line.direction) * [1.0, -1.0]
         band = circle(line, R, places, frame, np.broadcast_to(angles, (len(places), len(angles))))
         return joined(
             [
