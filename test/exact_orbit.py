@@ -8,8 +8,9 @@ import numpy as np
 
 def fractions(array):
     """Return nested lists of exact numbers."""
-    array = np.asarray(array)
-    return [fractions(row) for row in array] if array.ndim else Fraction(float(array))
+    if isinstance(array, Fraction):
+        return array
+    return [fractions(row) for row in array] if np.ndim(array) else Fraction(float(array))
 
 
 def dot(a, b):
