@@ -14,7 +14,12 @@ import numpy as np
 import pytest
 
 from trajectory_guard.errors import Reason, RequestError
-from trajectory_guard.toleranced.bounding_ball import control_ball, curvature_ball, minimal_ball
+from trajectory_guard.toleranced.bounding_ball import (
+    control_ball,
+    curvature_ball,
+    minimal_ball,
+    tangent_ratio,
+)
 from trajectory_guard.toleranced.curve_bounds import curvature_bound, length_bound
 from trajectory_guard.toleranced.metric import MassDistribution
 from trajectory_guard.toleranced.smallest_ball import smallest_ball
@@ -161,6 +166,13 @@ def circle_arc(metric, angle):
         [[0.0, 0.0], [math.tan(half), 0.0], [math.sin(angle), 1.0 - math.cos(angle)]]
     )
     return Motion(points, np.array([1.0, math.cos(half), 1.0]))
+
+
+def test_the_tangent_is_bounded():
+    """Above the tangent, and the more so in the middle, where 0.178 is not 2/15."""
+    for x in np.linspace(1e-6, 0.25 * np.pi, 1000):
+        assert math.tan(x) / x <= tangent_ratio(x) <= math.tan(x) / x * 1.006
+    assert 1.0 <= tangent_ratio(0.0) <= 1.0 + 1e-15
 
 
 def test_a_circle_has_its_curvature():

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from trajectory_guard.errors import Reason, RequestError
-from trajectory_guard.toleranced.metric import MassDistribution
+from trajectory_guard.toleranced.displacement_ball import DisplacementBall
+from trajectory_guard.toleranced.metric import MassDistribution, stretch_bound
 from trajectory_guard.toleranced.minimum_ellipsoid import least_distortion, optimal_weights
 from trajectory_guard.toleranced.moments import Moments
 
@@ -145,8 +146,8 @@ def test_bounds_include_the_exact_numbers(scale, offset):
     rng = np.random.default_rng(4)
     for thin in (1.0, 1e-3, 1e-7):
         points, weights = random_points(rng, scale, offset)
-        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-        points = points @ (turn * [1.0, 1.0, thin])
+        first, second = (np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2))
+        points = points @ first * [1.0, 1.0, thin] @ second
         metric = MassDistribution.of_points(points, weights)
         xs = np.concatenate((points, points.mean(axis=0) + 3.0 * scale * rng.normal(size=(3, 3))))
         for x in xs:
@@ -162,6 +163,29 @@ def test_bounds_include_the_exact_numbers(scale, offset):
             exact = distance_squared(metric, alpha, beta)
             assert exact <= bound**2
             assert float(bound) <= float(exact) ** 0.5 * (1.0 + 1e-5)
+
+
+def test_a_coarse_inverse_is_paid_for():
+    """Whatever W is: rates from it, with its stretch, are not below the exact ones."""
+    rng = np.random.default_rng(10)
+    for _ in range(20):
+        metric = MassDistribution.of_points(*random_points(rng))
+        W = metric.inverse + 1e-2 * np.abs(metric.inverse).max() * rng.normal(
+            size=(3, 3)
+        ) * rng.choice([1.0, 1e-3])
+        try:
+            stretch = stretch_bound(W, metric.factor)
+        except RequestError:
+            continue
+        object.__setattr__(metric, 'inverse', W)
+        object.__setattr__(metric, 'stretch', stretch)
+        ball = DisplacementBall(metric, np.eye(3, 4), 0.7)
+        for x in rng.normal(size=(10, 3)):
+            exact = rho_squared(metric, fractions(x))
+            assert exact <= Fraction(float(metric.rho_bound(x))) ** 2
+            h = ball.orbit(x[None]).distortion
+            length = sum(y * y for y in fractions(h.origin))
+            assert Fraction(0.7) ** 2 * exact <= length * (1 + Fraction(1, 10**12))
 
 
 def test_feature_points_have_their_rates():
@@ -300,4 +324,4 @@ def test_optimal_weights_of_a_regular_body_are_equal():
     assert np.allclose(best.weights[:8], 0.125, atol=1e-4)
     assert best.weights[8] < 1e-4
     with pytest.raises(RequestError, match='gap'):
-        least_distortion(np.random.default_rng(0).normal(size=(50, 3)), gap=-1.0)
+        least_distortion(np.random.default_rng(0).normal(size=(50, 3)), gap=1e-18)

@@ -284,26 +284,25 @@ def closed_volume(mesh):
     return np.einsum('ni,ni->', v[:, 0], np.cross(v[:, 1], v[:, 2])) / 6.0
 
 
-@pytest.mark.parametrize('affine', [False, True])
-@pytest.mark.parametrize('share', [0.1, 0.6, 0.97])
+@pytest.mark.parametrize(('share', 'affine'), [(0.1, False), (0.6, True), (0.97, False)])
 def test_meshes_of_convex_orbits_are_closed_and_on_the_boundary(share, affine):
     """Watertight, outward, every vertex at distance zero from the union of the balls."""
     rng = np.random.default_rng(9)
     ball, polygon = random_ball(rng, OCTAGON + [3.0, 1.0, 2.0], share, affine)
     fat = FatPolygon(ball, polygon)
-    volumes = [closed_volume(fat.boundary_mesh(n)) for n in (2, 6, 18)]
+    volumes = [closed_volume(fat.boundary_mesh(n)) for n in (2, 5, 12)]
     assert volumes[0] > 0.0
-    assert abs(volumes[2] - volumes[1]) < 0.2 * abs(volumes[1] - volumes[0])
-    mesh = fat.boundary_mesh(4)
+    assert abs(volumes[2] - volumes[1]) < 0.25 * abs(volumes[1] - volumes[0])
+    mesh = fat.boundary_mesh(3)
     assert set(mesh.labels) == set(Patch)
     assert len(mesh.labels) == len(mesh.triangles)
     square = (ball.radius * ball.distribution.rho(polygon.vertices).max()) ** 2
     for p in mesh.vertices:
         assert abs(least_square(p, fat.orbits, TRIANGLE)) < 1e-9 * square
     for edge in fat.edges[:2]:
-        volumes = [closed_volume(edge.boundary_mesh(n)) for n in (2, 6, 18)]
+        volumes = [closed_volume(edge.boundary_mesh(n)) for n in (2, 5, 12)]
         assert volumes[0] > 0.0
-        assert abs(volumes[2] - volumes[1]) < 0.2 * abs(volumes[1] - volumes[0])
+        assert abs(volumes[2] - volumes[1]) < 0.25 * abs(volumes[1] - volumes[0])
         for p in edge.boundary_mesh(3).vertices:
             assert abs(least_square(p, [edge.orbit], SEGMENT)) < 1e-9 * square
     point = fat.points[0]

@@ -76,9 +76,6 @@ def curvature_ball(motion: RationalCurve, metric: MassDistribution) -> Displacem
         2 sin gamma (tan(gamma/2) - k) <= 0. At a = t - gamma its derivative by gamma is
         2 (t - gamma) sin gamma (k - tan(gamma/2)) >= 0, and at gamma = t it is 0: so <= 0 before.
 
-    tan x <= x + x^3/3 + 0.178 x^5 for x <= pi/4: the quotient of the remainder by x^5 increases
-    (its power series has positive coefficients) and is 0.1778 at pi/4.
-
     :param motion: the motion.
     :param metric: the metric.
     :raises RequestError: INVALID_PARAMETER, the motion is not one.
@@ -88,8 +85,7 @@ def curvature_ball(motion: RationalCurve, metric: MassDistribution) -> Displacem
     turned = length * curvature * (1.0 + 2.0 * U)
     if not turned <= RIGHT_ANGLE:
         return None
-    square = (0.5 * turned) ** 2
-    k = 0.5 * length * (1.0 + square / 3.0 + 0.178 * square**2) * (1.0 + 16.0 * U)
+    k = 0.5 * length * tangent_ratio(0.5 * turned) * (1.0 + 8.0 * U)
     # The exact tangent is that of the exact difference; the centre may be off along it and across.
     side = points[1] - points[0]
     way = metric.distance(points[1], points[0])
@@ -99,6 +95,17 @@ def curvature_ball(motion: RationalCurve, metric: MassDistribution) -> Displacem
     across = float(metric.size_bound(2.0 * U * np.abs(points[0]) + 4.0 * U * step * np.abs(side)))
     radius = (k + along + across) * (1.0 + 8.0 * U) + UNDERFLOW
     return DisplacementBall(metric, center, radius)
+
+
+def tangent_ratio(x: float) -> float:
+    """
+    Return an upper bound of tan(x) / x for 0 <= x <= pi/4: 1 + x^2/3 + 0.178 x^4.
+
+    The quotient of the remainder tan x - x - x^3/3 by x^5 increases, as its power series has
+    positive coefficients, and is less than 0.1778 at pi/4.
+    """
+    square = x * x
+    return (1.0 + square / 3.0 + 0.178 * square * square) * (1.0 + 8.0 * U)
 
 
 def _round(center: np.ndarray, points: np.ndarray, metric: MassDistribution) -> DisplacementBall:

@@ -75,7 +75,7 @@ class MassDistribution:
             )
         W = np.linalg.inv(F)
         object.__setattr__(self, 'inverse', read_only(W))
-        object.__setattr__(self, 'stretch', _stretch(W, F))
+        object.__setattr__(self, 'stretch', stretch_bound(W, F))
 
     @classmethod
     def of_points(cls, points: ArrayLike, weights: ArrayLike | None = None) -> 'MassDistribution':
@@ -341,12 +341,16 @@ def feature_points(points: ArrayLike, weights: ArrayLike | None) -> tuple[np.nda
     return points, weights
 
 
-def _stretch(W: np.ndarray, F: np.ndarray) -> float:
+def stretch_bound(W: np.ndarray, F: np.ndarray) -> float:
     """
     Return s with |F^-1 y| <= s |W y|: W F = I - E gives F^-1 = (I - E)^-1 W, s = 1 / (1 - |E|).
 
     An entry of W F - I is three products and four sums, within 4 U of the same with all numbers
     absolute. |F| |W| is at most 9 / FLAT, so |E| is far below 1.
+
+    :param W: (3, 3), nearly the inverse.
+    :param F: (3, 3).
+    :raises RequestError: INVALID_PARAMETER, it is not.
     """
     E = np.linalg.norm(W @ F - np.eye(3)) * (1.0 + 16.0 * U)
     E += 8.0 * U * np.linalg.norm(np.abs(W) @ np.abs(F) + np.eye(3))

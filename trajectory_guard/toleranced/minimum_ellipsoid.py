@@ -33,7 +33,7 @@ class OptimalWeights(NamedTuple):
         return self.worst / D - 1.0
 
 
-def optimal_weights(points: ArrayLike, gap: float = 1e-6, steps: int = 100_000) -> OptimalWeights:
+def optimal_weights(points: ArrayLike, gap: float = 1e-6, steps: int = 10_000) -> OptimalWeights:
     """
     Return weights on given points whose largest distortion rate is nearly as small as possible.
 

@@ -143,17 +143,23 @@ def lower_bound(r: Affine, h: Affine, domain: np.ndarray) -> float:
     size_r, size_h = r.size, h.size
     S = size_r**2 + size_h**2
     margin = VALUE * S + 2.0 * size_r * r.error + (2.0 * size_h + h.error) * h.error
-    least = _least(quadratic(r, h), domain, CURVATURE * S)
+    least = least_value(quadratic(r, h), domain, CURVATURE * S)
     return least - margin * (1.0 + 32.0 * U) - UNDERFLOWN_SQUARE
 
 
-def _least(q: Quadratic, domain: np.ndarray, doubt: float) -> float:
-    """Return a lower bound over a domain, for a curvature that is right within `doubt`."""
+def least_value(q: Quadratic, domain: np.ndarray, doubt: float) -> float:
+    """
+    Return a lower bound over a domain.
+
+    :param q: the quadratic.
+    :param domain: corners, (n, d).
+    :param doubt: how far a computed curvature may be from the true one.
+    """
     if len(domain) == 1:
         return q.c
     curvature = q.curvature()
     if curvature < -doubt:
-        return min(_least(q.on(*side), unit, doubt) for side, unit in _boundary(domain))
+        return min(least_value(q.on(*side), unit, doubt) for side, unit in _boundary(domain))
     z = minimiser(q, domain)
     slope = 2.0 * (q.b + q.A @ z)
     tangent = q.c + domain @ slope - z @ q.A @ z
