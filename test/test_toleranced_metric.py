@@ -188,6 +188,19 @@ def test_a_coarse_inverse_is_paid_for():
             assert Fraction(0.7) ** 2 * exact <= length * (1 + Fraction(1, 10**12))
 
 
+@pytest.mark.parametrize('shear', [0.0, 2.0**12])
+def test_rounding_of_a_rate_is_paid_for(shear):
+    """An exact inverse, so that no stretch helps: cancellation and roots alone."""
+    rng = np.random.default_rng(11)
+    F = np.array([[1.0, 0.0, 0.0], [shear, 1.0, 0.0], [0.0, 0.0, 0.5]])
+    metric = MassDistribution(3.0, rng.normal(size=3), F)
+    assert np.array_equal(metric.inverse @ F, np.eye(3))
+    object.__setattr__(metric, 'stretch', 1.0)
+    for _ in range(300):
+        x = metric.barycenter + F @ rng.normal(size=3)
+        assert rho_squared(metric, fractions(x)) <= Fraction(float(metric.rho_bound(x))) ** 2
+
+
 def test_feature_points_have_their_rates():
     """Sum w_i rho^2(m_i) = 4: no point of the body is moved much farther than the metric says."""
     rng = np.random.default_rng(5)
@@ -324,4 +337,4 @@ def test_optimal_weights_of_a_regular_body_are_equal():
     assert np.allclose(best.weights[:8], 0.125, atol=1e-4)
     assert best.weights[8] < 1e-4
     with pytest.raises(RequestError, match='gap'):
-        least_distortion(np.random.default_rng(0).normal(size=(50, 3)), gap=1e-18)
+        least_distortion(np.random.default_rng(0).normal(size=(50, 3)), steps=3)

@@ -15,6 +15,9 @@ D = 4
 # Updates of rank one drift, so after so many steps M is inverted anew.
 REFRESH = 64
 
+# The iteration converges linearly; a few hundred steps are usual.
+STEPS = 10_000
+
 
 class OptimalWeights(NamedTuple):
     """
@@ -33,7 +36,7 @@ class OptimalWeights(NamedTuple):
         return self.worst / D - 1.0
 
 
-def optimal_weights(points: ArrayLike, gap: float = 1e-6, steps: int = 10_000) -> OptimalWeights:
+def optimal_weights(points: ArrayLike, gap: float = 1e-6, steps: int = STEPS) -> OptimalWeights:
     """
     Return weights on given points whose largest distortion rate is nearly as small as possible.
 
@@ -96,16 +99,17 @@ def _best_step(weights: np.ndarray, rates: np.ndarray) -> tuple[int, float]:
     return low, float(max((rates[low] - D) / (D * (rates[low] - 1.0)), all_of_it))
 
 
-def least_distortion(points: ArrayLike, gap: float = 1e-6) -> MassDistribution:
+def least_distortion(points: ArrayLike, gap: float = 1e-6, steps: int = STEPS) -> MassDistribution:
     """
     Return the distribution of mass 1 on given points with nearly the least worst distortion rate.
 
     :param points: (n, 3), not in a plane [m].
     :param gap: allowed relative excess of max rho^2 over 4.
+    :param steps: most steps.
     :raises RequestError: INVALID_PARAMETER, the points lie in a plane or are not finite, or the
         gap was not reached.
     """
-    best = optimal_weights(points, gap)
+    best = optimal_weights(points, gap, steps)
     if not best.gap <= gap * (1.0 + 1e-3) + 1e-12:
         raise RequestError(
             Reason.INVALID_PARAMETER, f'gap {gap} was not reached, only {best.gap:.3g}'
