@@ -330,7 +330,7 @@ def test_a_reflex_notch_is_open_space():
 
 
 def test_features_miss_what_pierces():
-    """The counterexample of DESIGN 5: all tests say apart, though the solids cross."""
+    """A counterexample to Listing 2: all tests say apart, though the polygons cross."""
     P = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float)
     metric = MassDistribution.of_points(np.concatenate((P, [[0, 0, 0.3]])), np.ones(5))
     F = np.array([[0, -0.1, -0.8], [0, 0.1, -0.8], [0, 0, 0.9]])

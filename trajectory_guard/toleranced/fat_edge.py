@@ -68,7 +68,14 @@ class FatEdge:
         return not apart(feature(p, (3,), 'p')[None], self.orbit)
 
     def distance_bound(self, p: np.ndarray) -> float:
-        """Return a lower bound of a point's distance to the orbit. (3,) [m]."""
+        """
+        Return a lower bound of a point's distance to the orbit [m].
+
+        Nearly exact near the orbit; farther off it may lack a part of how R rho differs along the
+        feature.
+
+        :param p: (3,) in the world frame [m].
+        """
         p = feature(p, (3,), 'p')
         return largest_accepted(
             lambda d: apart(p[None], self.orbit, d), distance_guess(self.ball, self.ends, p)

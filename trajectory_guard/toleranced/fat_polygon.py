@@ -71,7 +71,14 @@ class FatPolygon:
         return not self.apart(p)
 
     def distance_bound(self, p: np.ndarray) -> float:
-        """Return a lower bound of a point's distance to the orbit. (3,) [m]."""
+        """
+        Return a lower bound of a point's distance to the orbit [m].
+
+        Nearly exact near the orbit; farther off it may lack a part of how R rho differs along the
+        feature.
+
+        :param p: (3,) in the world frame [m].
+        """
         p = feature(p, (3,), 'p')
         guess = distance_guess(self.ball, self.polygon.vertices, p)
         return largest_accepted(lambda d: self.apart(p, d), guess)

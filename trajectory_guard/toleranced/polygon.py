@@ -131,9 +131,9 @@ def _is_ear(points: np.ndarray, left: list[int], k: int, area: float) -> bool:
 
 
 def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """Return twice the signed areas of triangles a, b, c; c may be (n, 2)."""
+    """Return twice the signed areas of triangles a, b, c, each (2,) or (n, 2)."""
     side, away = b - a, c - a
-    turn: np.ndarray = side[0] * away[..., 1] - side[1] * away[..., 0]
+    turn: np.ndarray = side[..., 0] * away[..., 1] - side[..., 1] * away[..., 0]
     return turn
 
 
@@ -142,20 +142,19 @@ def _crosses_itself(points: np.ndarray, area: float) -> bool:
     n = len(points)
     ends = np.roll(points, -1, axis=0)
     for i in range(n):
-        a, b = points[i], ends[i]
-        if abs(_turn(a, b, ends[(i + 1) % n])) <= area and (a - b) @ (ends[(i + 1) % n] - b) > 0.0:
+        a, b, after = points[i], ends[i], ends[(i + 1) % n]
+        if abs(_turn(a, b, after)) <= area and (a - b) @ (after - b) > 0.0:
             return True
-        others = [j for j in range(i + 2, n) if (j + 1) % n != i]
-        for j in others:
-            c, d = points[j], ends[j]
-            sides = _turn(a, b, np.array([c, d])), _turn(c, d, np.array([a, b]))
-            if (
-                all(side.min() <= area and side.max() >= -area for side in sides)
-                and (
-                    (np.maximum(a, b) >= np.minimum(c, d)) & (np.maximum(c, d) >= np.minimum(a, b))
-                ).all()
-            ):
-                return True
+        others = slice(i + 2, n if i else n - 1)
+        c, d = points[others], ends[others]
+        # Both ends of neither edge are on one side of the other, and their boxes meet.
+        meet = np.ones(len(c), dtype=bool)
+        for sides in ((_turn(a, b, c), _turn(a, b, d)), (_turn(c, d, a), _turn(c, d, b))):
+            meet &= (np.minimum(*sides) <= area) & (np.maximum(*sides) >= -area)
+        meet &= (np.maximum(a, b) >= np.minimum(c, d)).all(axis=1)
+        meet &= (np.maximum(c, d) >= np.minimum(a, b)).all(axis=1)
+        if meet.any():
+            return True
     return False
 
 
