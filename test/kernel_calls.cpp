@@ -131,6 +131,22 @@ int64_t call_witness(const double* matrices, double eps, const double* centre, c
   return proved;
 }
 
+// How far two triangles (3, 3) that cross may move and still cross; where is written to `place`.
+double call_crossing(const double* mine, const double* theirs, double* place) {
+  Triangle a, b;
+  std::memcpy(a.corner, mine, sizeof a.corner);
+  std::memcpy(b.corner, theirs, sizeof b.corner);
+  return crossing(a, b, place);
+}
+
+// How far a contact of a triangle may move; the link's point and its place are written to `out`.
+double call_contact(const double* matrix, const Solids* links, const Solids* obstacles,
+                    double* out) {
+  double pose[POSE];
+  pose_of(matrix, pose);
+  return contact(*links, 0, *obstacles, 0, pose, out, out + 3);
+}
+
 void call_restrict(const double* coefficients, double m, double h, double* d, double* out) {
   Restricted r = restrict_to(coefficients, m, h, d);
   out[0] = r.span;
@@ -275,11 +291,13 @@ int64_t call_layout(char* text, int64_t room) {
   VALUE(TERMS), VALUE(LANES);
   VALUE(TURN_ERROR), VALUE(SHIFT_ERROR), VALUE(STRETCH), VALUE(RIGID);
   VALUE(guard::FIRST), VALUE(guard::LAST), VALUE(FACE_FIRST), VALUE(FACE_LAST);
-  VALUE(guard::NODE), VALUE(RANGES);
+  VALUE(guard::NODE), VALUE(WHOLE), VALUE(PARTS), VALUE(CHILD), VALUE(RANGES);
+  VALUE(NO_PARTS), VALUE(BUILT), VALUE(UNBUILT), VALUE(TRIANGLE);
   VALUE(BALL), VALUE(DISC), VALUE(CORE), VALUE(FAR), VALUE(SIZES);
   VALUE(AXIS), VALUE(CENTRE), VALUE(HALF), VALUE(BOX), VALUE(PLACES), VALUE(BOX_ROWS);
   VALUE(UNDECIDED), VALUE(guard::FREE), VALUE(SUSPECT), VALUE(COLLISION);
   VALUE(BY_TOLERANCE), VALUE(BY_DEPTH), VALUE(BY_BUDGET), VALUE(BY_STOP), VALUE(BY_SCOPE);
+  VALUE(BY_HULL), VALUE(BY_ENCLOSURE);
   VALUE(SCOPE_ALL), VALUE(SCOPE_FIRST), VALUE(SCOPE_VERDICT);
   VALUE(BALLS_APART), VALUE(PLANE_BETWEEN), VALUE(PLANE_TURNING);
   VALUE(CONTROLS), VALUE(CONTROL_ROW), VALUE(ROUNDS), VALUE(DEEPEST_LEVEL);
@@ -298,11 +316,17 @@ int64_t call_layout(char* text, int64_t room) {
   SIZE(Entry);
   FIELD(Entry, kind), FIELD(Entry, piece), FIELD(Entry, body), FIELD(Entry, obstacle);
   FIELD(Entry, turn.n), FIELD(Entry, turn.m), FIELD(Entry, turn.k), FIELD(Entry, offset);
+  SIZE(Opened);
+  FIELD(Opened, segment), FIELD(Opened, numerator), FIELD(Opened, level), FIELD(Opened, body);
+  FIELD(Opened, obstacle);
+  SIZE(Wanted);
+  FIELD(Wanted, side), FIELD(Wanted, solid);
   SIZE(Chain);
   FIELD(Chain, nodes), FIELD(Chain, parent), FIELD(Chain, kind), FIELD(Chain, transform);
   FIELD(Chain, depth);
   SIZE(Solids);
-  FIELD(Solids, count), FIELD(Solids, ranges), FIELD(Solids, size), FIELD(Solids, place);
+  FIELD(Solids, count), FIELD(Solids, wholes), FIELD(Solids, ranges), FIELD(Solids, size),
+      FIELD(Solids, place);
   FIELD(Solids, vertices), FIELD(Solids, vertex_stride), FIELD(Solids, faces);
   FIELD(Solids, face_stride);
   SIZE(Boxes);
@@ -322,8 +346,9 @@ int64_t call_layout(char* text, int64_t room) {
   FIELD(Request, body_count);
   SIZE(Answer);
   FIELD(Answer, leaf_count), FIELD(Answer, entry_count), FIELD(Answer, piece_count);
+  FIELD(Answer, opened_count), FIELD(Answer, wanted_count);
   FIELD(Answer, pieces), FIELD(Answer, seconds), FIELD(Answer, leaves), FIELD(Answer, entries);
-  FIELD(Answer, proved_on);
+  FIELD(Answer, proved_on), FIELD(Answer, opened), FIELD(Answer, wanted);
   return used;
 }
 

@@ -216,6 +216,26 @@ def witness(
     return bool(proved), known[:3], known[3], known[4:7], known[7:]
 
 
+def crossing(mine, theirs):
+    """Call the proof that two triangles cross; returns how far they may move, and the place."""
+    place = np.zeros(3)
+    rim = call('call_crossing', _floats(mine), _floats(theirs), place)
+    return rim, place
+
+
+def contact(pose, links, obstacles):
+    """
+    Call the search for a contact of a triangle with a triangle or a polytope.
+
+    :returns: how far it may move, not positive if there is none; link point (3,), place (3,).
+    """
+    out = np.zeros(6)
+    slack = call(
+        'call_contact', _floats(pose).reshape(12), _solids(links), _solids(obstacles), out
+    )
+    return slack, out[:3], out[3:]
+
+
 def depth(solids, x, b=0):
     """Call the depth of a point in a solid's inscribed polytope."""
     return call('call_depth', _solids(solids), b, _floats(x))

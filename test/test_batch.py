@@ -62,7 +62,7 @@ def test_an_unforeseen_error_rejects_what_it_meets(monkeypatch):
     def out_of_memory(*_others):
         raise MemoryError
 
-    monkeypatch.setattr(certify_module, 'cover_all', out_of_memory)
+    monkeypatch.setattr(certify_module, 'cover_refined', out_of_memory)
     assert {r.verdict for r in judge_all(cell, some, None, SETTINGS)} == {Verdict.REJECTED}
 
 

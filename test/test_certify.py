@@ -563,7 +563,7 @@ def test_an_unforeseen_error_is_a_rejection(monkeypatch):
     def broken(*_args):
         raise ZeroDivisionError('broken on purpose')
 
-    monkeypatch.setattr(certify_module, 'cover_all', broken)
+    monkeypatch.setattr(certify_module, 'cover_refined', broken)
     result = judge(slider(), slide(0.0, 1.0))
     assert result.verdict == Verdict.REJECTED
     assert result.reason_code == Reason.INTERNAL_ERROR.value

@@ -96,7 +96,7 @@ def test_no_faces_no_claim():
     links, obstacles = solids([body], [0]), solids([body], [-1])
     points = np.array([[1.0, 0, 0, 0, 0, 1.0, 0, 0, 0, 0, 1.0, 0]])
     assert kernel_calls.deepest(points, links, obstacles)[0]
-    bare = links._replace(ranges=links.ranges * np.array([1, 1, 0, 0, 1]))
+    bare = links._replace(ranges=links.ranges * np.array([1, 1, 0, 0, 1, 1, 1, 1]))
     assert kernel_calls.depth(bare, [0.0, 0.0, 0.0]) == -math.inf
     assert not kernel_calls.deepest(points, bare, obstacles)[0]
     assert not kernel_calls.deepest(points, links, bare)[0]

@@ -17,7 +17,13 @@ SHARED = sorted(
     name for name, value in vars(layout).items() if name in VALUES and isinstance(value, int)
 )
 
-RECORDS = {'Leaf': layout.LEAF, 'Piece': layout.PIECE, 'Entry': layout.ENTRY}
+RECORDS = {
+    'Leaf': layout.LEAF,
+    'Piece': layout.PIECE,
+    'Entry': layout.ENTRY,
+    'Opened': layout.OPENED,
+    'Wanted': layout.WANTED,
+}
 # What the leaf's `known` calls otherwise.
 KNOWN = {'y0': 'start', 'y1': 'end'}
 

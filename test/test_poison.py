@@ -144,7 +144,8 @@ def leaves(parts, packed):
     except layout.KernelRefused:
         refused = np.zeros(1, layout.LEAF)
         refused['end'], refused['status'] = 1, layout.SUSPECT
-        return Covered(refused, 0, 0.0, np.zeros(0, layout.ENTRY), np.zeros(0, layout.PIECE))
+        kinds = (layout.ENTRY, layout.PIECE, layout.OPENED, layout.WANTED)
+        return Covered(refused, 0, 0.0, *(np.zeros(0, kind) for kind in kinds))
 
 
 def spans(rows, status):

@@ -8,9 +8,13 @@ polytope: the body proves that nothing is touched, the polytope that something i
 
 from dataclasses import dataclass, field
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+if TYPE_CHECKING:
+    from trajectory_guard.surface import Surface
 
 # Unit roundoff of float64.
 U = 2.0**-53
@@ -80,6 +84,7 @@ class ConvexBody:
     :param disc_axis: unit normal of the disc, (3,); z if there is no disc.
     :param faces: rows (n, d), (m, 4): the polytope {x: n . x <= d} is bounded and lies inside the
         *real* geometry; |n| is 1 within 4 * 2^-53, d in m. No rows: nothing is known to be inside.
+    :param surface: the real geometry, if that is a mesh and the body is more.
     :raises ValueError: a value is not finite, negative, or larger than `LARGEST_COORDINATE`.
     """
 
@@ -88,6 +93,7 @@ class ConvexBody:
     disc_radius: float = 0.0
     disc_axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     faces: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
+    surface: 'Surface | None' = field(default=None, repr=False)
     center: np.ndarray = field(init=False)
     radius: float = field(init=False)
 
@@ -138,6 +144,7 @@ class ConvexBody:
             disc_radius=self.disc_radius,
             disc_axis=disc_axis / np.linalg.norm(disc_axis),
             faces=self._faces_moved(R, t),
+            surface=self.surface and self.surface.moved(read_only(T)),
         )
 
     def _faces_moved(self, R: np.ndarray, t: np.ndarray) -> np.ndarray:

@@ -14,8 +14,9 @@ from trajectory_guard.errors import Reason, TrajectoryGuardError
 from trajectory_guard.floating_path import floating_path
 from trajectory_guard.free_path import FreePath
 from trajectory_guard.joint_path import joint_path, JointPath
-from trajectory_guard.kernels.cover import cover_all, Covered, Question
+from trajectory_guard.kernels.cover import Covered, Question
 from trajectory_guard.kernels.layout import KernelRefused, Path
+from trajectory_guard.refine import cover_refined, Seen
 from trajectory_guard.request import check_joints, motion_path, refusal, tracking_slack
 from trajectory_guard.result import Interval, NANOSECONDS, Result, Status, Verdict
 from trajectory_guard.settings import Settings
@@ -71,8 +72,8 @@ def certify(
     if slack is None:
         slack = tracking_slack(workcell.robot.movable, path, _moved(path), settings)
     job = _job(workcell, path, slack, begin)
-    (covered,) = _cover(workcell, [job], settings)
-    return _answer(workcell, job, covered, settings).result
+    (seen,) = _cover(workcell, [job], settings)
+    return _answer(workcell, job, seen, settings).result
 
 
 def judge(
@@ -115,7 +116,7 @@ def judge_some(
         except Exception as error:  # fail closed: no error may leave a request open
             results.append(_rejected(error, settings, trajectory.name))
     try:
-        covered = iter(_cover(workcell, jobs, settings))
+        seen = iter(_cover(workcell, jobs, settings))
     except Exception as error:  # fail closed
         return [
             result or _rejected(error, settings, trajectory.name)
@@ -126,7 +127,7 @@ def judge_some(
         if results[i] is None:
             try:
                 results[i] = _result(
-                    workcell, trajectory, start, next(waiting), next(covered), settings
+                    workcell, trajectory, start, next(waiting), next(seen), settings
                 )
             except Exception as error:  # fail closed
                 results[i] = _rejected(error, settings, trajectory.name)
@@ -175,18 +176,10 @@ def _job(workcell: Workcell, path: JointPath, slack: np.ndarray, begin: float) -
     return _Job(path, slack, motion, pairs, time.perf_counter() - begin)
 
 
-def _cover(workcell: Workcell, jobs: Sequence[_Job], settings: Settings) -> list[Covered | None]:
+def _cover(workcell: Workcell, jobs: Sequence[_Job], settings: Settings) -> list[Seen | None]:
+    questions = [Question(job.motion, job.pairs.moving) for job in jobs]
     with stop_flag(settings.deadline_ns) as stop:
-        return cover_all(
-            workcell.packed,
-            [Question(job.motion, job.pairs.moving) for job in jobs],
-            settings.tolerance,
-            settings.clearance,
-            settings.max_pieces,
-            settings.scope,
-            settings.want_certificate,
-            stop,
-        )
+        return cover_refined(workcell.detail, questions, settings, stop)
 
 
 def _result(
@@ -194,11 +187,11 @@ def _result(
     trajectory: Trajectory,
     start: JointState | None,
     job: _Job,
-    covered: Covered | None,
+    seen: Seen | None,
     settings: Settings,
 ) -> Result:
     """Return the answer to a trajectory, with its certificate if one is wanted."""
-    answer = _answer(workcell, job, covered, settings, trajectory.name)
+    answer = _answer(workcell, job, seen, settings, trajectory.name)
     if not settings.want_certificate:
         return answer.result
     proof = certificate(workcell, trajectory, start, job.path, job.slack, *answer)
@@ -206,14 +199,14 @@ def _result(
 
 
 def _answer(
-    workcell: Workcell, job: _Job, covered: Covered | None, settings: Settings, name: str = ''
+    workcell: Workcell, job: _Job, seen: Seen | None, settings: Settings, name: str = ''
 ) -> _Answer:
     """Return the result of a covered path; raises what was wrong with a refused one."""
     begin = time.perf_counter()
-    if covered is None:
+    if seen is None:
         raise refusal(job.path, job.slack) or KernelRefused
-    path, pairs = job.path, job.pairs
-    leaves = with_witnesses(covered.leaves)
+    path, pairs, covered = job.path, job.pairs, seen.covered
+    leaves = with_witnesses(_leaves(workcell, job, seen))
     rows = intervals(
         path.knots_ns,
         leaves,
@@ -222,7 +215,10 @@ def _answer(
         path.unknown_until_ns,
     )
     verdict, reason, message = _verdict(rows)
-    warnings = _warnings(workcell, job.motion, pairs, path)
+    warnings = (
+        *_warnings(workcell, job.motion, pairs, path),
+        *_mesh_warnings(workcell, covered, rows, settings),
+    )
     result = Result(
         verdict=verdict,
         reason_code=reason,
@@ -242,6 +238,17 @@ def _answer(
         name=name,
     )
     return _Answer(result, leaves, covered)
+
+
+def _leaves(workcell: Workcell, job: _Job, seen: Seen) -> np.ndarray:
+    """Return leaves that name wholes, free where also none of them is inside another."""
+    # Parts come only from pairs that were taken apart.
+    if not len(seen.covered.opened):
+        return seen.covered.leaves
+    # Brings scipy, which is slow to import.
+    from trajectory_guard.enclosed import without_enclosures
+
+    return without_enclosures(workcell.detail, seen, job.motion)
 
 
 def _verdict(rows: Sequence[Interval]) -> tuple[Verdict, str, str]:
@@ -275,3 +282,31 @@ def _warnings(workcell: Workcell, motion: Path, pairs: Pairs, path: JointPath) -
     if not path.limits_checked:
         warnings.append('joint limits were not checked')
     return tuple(warnings)
+
+
+def _mesh_warnings(
+    workcell: Workcell, covered: Covered, rows: Sequence[Interval], settings: Settings
+) -> list[str]:
+    """Return which meshes were taken for something else than solids of their own shape."""
+    warnings = []
+    if len(covered.opened):
+        links, obstacles = workcell.detail.surfaces
+        opened = {
+            *((links[b], workcell.link_names[b]) for b in covered.opened['body']),
+            *((obstacles[o], workcell.obstacle_names[o]) for o in covered.opened['obstacle']),
+        }
+        names = {name for surface, name in opened if surface and not surface.is_watertight}
+        if names:
+            warnings.append(f'open meshes, so nothing counts as inside: {_listed(names)}')
+    if settings.want_certificate:
+        named = {name for row in rows for name in (row.body, row.obstacle)}
+        names = named & workcell.refinable
+        if names:
+            warnings.append(
+                f'taken as convex hulls, because a certificate speaks of hulls: {_listed(names)}'
+            )
+    return warnings
+
+
+def _listed(names: set[str]) -> str:
+    return ', '.join(sorted(names))

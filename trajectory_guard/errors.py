@@ -63,6 +63,7 @@ class Reason(str, Enum):
     BUDGET = 'budget'
     DEADLINE = 'deadline'
     NOT_EXAMINED = 'not_examined'
+    ENCLOSURE = 'enclosure'
 
     # A certificate.
     CERTIFICATE_INVALID = 'certificate_invalid'

@@ -20,13 +20,15 @@ def free_body(name: str, *shapes: Shape) -> Robot:
     :param name: of the link.
     :param shapes: the link's collision geometry, in its frame.
     """
+    # Where a mesh file lies says nothing of the body; its content is hashed with the rest.
+    told = [shape.scale if isinstance(shape, MeshFile) else shape for shape in shapes]
     collisions = tuple(Collision(np.eye(4), shape) for shape in shapes)
     return Robot(
         name=name,
         root=ROOT,
         joints=floating_joint(ANY_NAME, ROOT, name, np.eye(4)),
         collisions={name: collisions},
-        source=repr(shapes).encode(),
+        source=repr(told).encode(),
     )
 
 

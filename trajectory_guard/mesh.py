@@ -13,6 +13,10 @@ from trajectory_guard.resource import places
 from trajectory_guard.robot import Loaded
 from trajectory_guard.unique_rows import unique_rows
 
+# A hull that exceeds its mesh by no more than this fraction of the size is the mesh: single
+# precision in a file makes a convex surface that uneven.
+TIGHT = 2.0**-20
+
 
 @dataclass(frozen=True, slots=True)
 class MeshFile:
@@ -62,6 +66,8 @@ def mesh_body(mesh: Triangles, scale: tuple[float, float, float] = (1.0, 1.0, 1.
     """
     Return the convex hull of a mesh, and an inscribed polytope if the mesh is a convex solid.
 
+    If the hull is more than the mesh, the body knows the mesh's surface.
+
     :param mesh: the surface; its corners may be off by its rounding.
     :param scale: factor along x, y, z.
     :raises ValueError: a scaled coordinate is too large.
@@ -69,6 +75,7 @@ def mesh_body(mesh: Triangles, scale: tuple[float, float, float] = (1.0, 1.0, 1.
     # Brings scipy, half of the time that the whole package takes to import.
     from trajectory_guard.hull import convex_hull
     from trajectory_guard.inscribed import inscribed_polytope
+    from trajectory_guard.surface import Surface
 
     scaled = mesh.points * scale + 0.0
     if not np.abs(scaled).max() <= LARGEST_COORDINATE:
@@ -81,4 +88,16 @@ def mesh_body(mesh: Triangles, scale: tuple[float, float, float] = (1.0, 1.0, 1.
         rounding += 2.0 * U * np.abs(points).max()
     hull = convex_hull(points)
     faces = inscribed_polytope(points, triangles, hull, rounding)
-    return ConvexBody(hull.vertices, ball=(hull.ball + rounding) * (1.0 + 4.0 * U), faces=faces)
+    surface = None
+    if len(triangles) > 1 and not _fills(faces, hull.vertices):
+        surface = Surface(points, triangles, rounding)
+    ball = (hull.ball + rounding) * (1.0 + 4.0 * U)
+    return ConvexBody(hull.vertices, ball=ball, faces=faces, surface=surface)
+
+
+def _fills(faces: np.ndarray, vertices: np.ndarray) -> bool:
+    """Tell whether an inscribed polytope is as good as the hull of the vertices."""
+    if not len(faces):
+        return False
+    excess = (vertices @ faces[:, :3].T).max(axis=0) - faces[:, 3]
+    return bool(excess.max() <= TIGHT * np.ptp(vertices, axis=0).max())

@@ -5,7 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from trajectory_guard.body import ConvexBody, U
-from trajectory_guard.kernels.layout import BALL, BOX, Boxes, FAR, HALF, LANES, Solids, UP
+from trajectory_guard.kernels.layout import (
+    BALL,
+    BOX,
+    Boxes,
+    FAR,
+    HALF,
+    LANES,
+    NO_PARTS,
+    Solids,
+    UNBUILT,
+    UP,
+)
 
 # A box frame is looked for among this many of a polytope's faces.
 FACES_TRIED = 12
@@ -29,6 +40,9 @@ def solids(bodies: Sequence[ConvexBody], nodes: Sequence[int]) -> Solids:
             face_ends - [len(rows) for rows in faces],
             face_ends,
             nodes,
+            np.arange(len(bodies)),
+            [NO_PARTS if body.surface is None else UNBUILT for body in bodies],
+            np.zeros(len(bodies)),
         ]
     )
     size = [

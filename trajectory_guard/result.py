@@ -44,7 +44,7 @@ class Interval:
     :param gap_lower: proved lower bound of the pair's distance over the interval and the tracking
         tolerance, negative when an overlap cannot be excluded [m]; None: unknown.
     :param gap_upper: upper bound of the pair's smallest distance in the interval, negative for a
-        proved overlap [m]; None: unknown.
+        proved overlap, 0 where surfaces are proved to cross [m]; None: unknown.
     """
 
     start_ns: int

@@ -19,6 +19,8 @@ _REASON = {
     layout.BY_BUDGET: Reason.BUDGET,
     layout.BY_STOP: Reason.DEADLINE,
     layout.BY_SCOPE: Reason.NOT_EXAMINED,
+    layout.BY_HULL: Reason.NOT_EXAMINED,
+    layout.BY_ENCLOSURE: Reason.ENCLOSURE,
 }
 
 

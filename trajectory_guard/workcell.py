@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from trajectory_guard.detail import Detail
 from trajectory_guard.errors import Reason, RobotError, SceneError
 from trajectory_guard.kernels.layout import Extents, FAR, NODE, Packed, Path, Solids, UP
 from trajectory_guard.kernels.touching import touching
@@ -14,6 +15,9 @@ from trajectory_guard.tree import Tree, tree
 
 # Sets of commanded joints whose pairs are kept; clients choose them, so their number is bounded.
 MOST_KEPT = 64
+
+# The centre of a part is a mean of up to 2^24 points or so, and rounds by as many units.
+MEAN = 1.0 + 2.0**-26
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +61,7 @@ class Workcell:
     obstacle_names: tuple[str, ...] = field(init=False)
     link_nodes: np.ndarray = field(init=False)
     packed: Packed = field(init=False, repr=False)
+    detail: Detail = field(init=False, repr=False)
     _pairs: dict[bytes, Pairs] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -79,30 +84,46 @@ class Workcell:
         obstacle_names = [o.name for o in self.scene.obstacles for _ in o.bodies]
         if not obstacle_names:
             raise SceneError(Reason.SCENE_EMPTY, 'the scene has no obstacle')
+        targets = [b for o in self.scene.obstacles for b in o.bodies]
         keep('tree', folded)
         keep('links', solids(bodies, [folded.link_node[name] for name in names]))
-        keep(
-            'obstacles',
-            solids(
-                [b for o in self.scene.obstacles for b in o.bodies], [-1] * len(obstacle_names)
-            ),
-        )
+        keep('obstacles', solids(targets, [-1] * len(targets)))
         keep('link_names', tuple(names))
         keep('obstacle_names', tuple(obstacle_names))
         keep('link_nodes', self.links.ranges[:, NODE].copy())
         # The culls move a body's centre, which may lie farther out than its vertices.
         out = np.array([np.linalg.norm(body.center) for body in bodies]) * UP
+        # A surface lies in its body, ball included, and its points off it by no more than that.
+        beyond = np.array([body.ball if body.surface else 0.0 for body in bodies])
+        up = np.array([MEAN if body.surface else 1.0 for body in bodies])
+        across = np.array([perpendicular(body) for body in bodies])
         extents = Extents(
-            extent=np.maximum(self.links.size[:, FAR], out),
-            perpendicular=np.array([perpendicular(body) for body in bodies]),
+            extent=(np.maximum(self.links.size[:, FAR], out) + beyond) * up,
+            perpendicular=(across + 2 * beyond) * up,
             offsets=np.array([folded.link_path[name] for name in names]),
         )
-        keep(
-            'packed',
-            Packed(folded.chain, self.links, self.obstacles, boxes(self.obstacles), extents),
+        detail = Detail(
+            folded.chain,
+            boxes(self.obstacles),
+            extents,
+            (self.links, self.obstacles),
+            ([body.surface for body in bodies], [body.surface for body in targets]),
         )
+        keep('detail', detail)
+        keep('packed', detail.level.packed)
         keep('robot_hash', self.robot.digest())
         keep('scene_hash', self.scene.digest)
+
+    @property
+    def refinable(self) -> frozenset[str]:
+        """Names of the links and obstacles with meshes that are less than their hulls."""
+        sides = zip(self.detail.surfaces, (self.link_names, self.obstacle_names), strict=True)
+        return frozenset(
+            name
+            for surfaces, names in sides
+            for surface, name in zip(surfaces, names, strict=True)
+            if surface
+        )
 
     def pairs(self, in_path: np.ndarray) -> Pairs:
         """

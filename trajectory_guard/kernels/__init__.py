@@ -10,8 +10,10 @@ NaN and infinity propagate, and every comparison that certifies is written so th
 *Trusted* (a wrong line here could call a collision free): the motion in ``piece.hpp``,
 ``economised.hpp``, ``rational.hpp`` and ``motion.hpp``; lever arms in ``reach.hpp``; the
 inequalities in ``separation.hpp`` and ``cull.hpp``; rounding in ``margin.hpp``; the books in
-``cover.hpp``, ``pair.hpp`` and ``leaf.hpp``; for collisions ``witness.hpp`` and the depths of
-``deepest.hpp``.  *Untrusted*, may only propose: ``gjk.hpp`` and the search in ``deepest.hpp``.
+``cover.hpp``, ``pair.hpp`` and ``leaf.hpp``; for collisions ``witness.hpp``, ``contact.hpp`` and
+the depths of ``deepest.hpp``; for pairs that were taken apart the core's ``parts.py``,
+``enclosed.py`` and ``containment.py``.  *Untrusted*, may only propose: ``gjk.hpp`` and the search
+in ``deepest.hpp``.
 
 Shared conventions: ``tau`` runs over [-1, 1] on a piece; a *node* is a movable joint, its frame
 moves with the joint and has the joint axis as z.

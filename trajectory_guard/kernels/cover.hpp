@@ -12,7 +12,10 @@
 //   would only cut finer what lies within the tolerance anyway, or when budget or depth are spent.
 //
 // A pair leaves the list of open pairs only after one of the inequalities of `cull` or `separation`
-// held.
+// held, or when the pairs of one side's parts take its place: their surfaces are then kept apart,
+// and whether one solid lies inside the other is for the core to exclude (`opened` says of which
+// pairs and pieces). Where parts are not built, the piece ends as suspect and they are asked for
+// (`wanted`).
 #pragma once
 
 #include <algorithm>
@@ -30,6 +33,17 @@ constexpr int64_t FINEST_WITNESS = 12;
 // more than this part of its own size.
 constexpr int64_t CROWD = 256;
 constexpr double WIDE = 0.25;
+
+// A pair whose hulls meet at the centre is replaced by pairs of parts once the body sweeps less
+// than this part of the size of the one that is taken apart.
+constexpr double FINE = 0.5;
+
+// Pairs of parts looked at after one has turned out to meet at the centre: its piece cannot become
+// free, but another one may prove a collision.
+constexpr int64_t MORE_TRIES = 32;
+
+// So many pairs of parts count as one piece of the budget.
+constexpr int64_t PART_PAIRS = 16;
 
 // How much of the motion is asked about; the values of `settings.Scope`.
 enum : int64_t { SCOPE_ALL, SCOPE_FIRST, SCOPE_VERDICT };
@@ -74,10 +88,26 @@ struct Work {
   std::vector<Node> nodes;
   std::vector<Body> bodies;
   std::vector<double> rho, chord, span, fuzz, fit, scratch;
-  std::vector<Live> live;
+  std::vector<Live> live, parts, extra;
   std::vector<Leaf> leaves;
+  std::vector<Opened> opened;
+  std::vector<Wanted> wanted;
   Proof proof;
   int64_t pieces = 0;
+  int64_t stamps = 0;      // pieces that this thread ever examined
+  int64_t part_pairs = 0;  // pairs of parts examined
+};
+
+// What the pairs of a piece leave to be said of it.
+struct Ending {
+  int64_t status = UNDECIDED, body = -1, obstacle = -1, witness = 0;
+  Known worst{};
+  double lowest = INFINITY;  // gap of all pairs that stay open, tracking included
+  bool coarse = false;       // parts that nobody has built were wanted
+  bool cut = false;          // time or budget were spent among the parts
+  bool meets = false;        // some pair of parts meets at the centre
+  bool urgent = false;       // the last pair should be the first one to be tried in a half
+  int64_t tries = MORE_TRIES;
 };
 
 // A piece to examine and its open pairs; a segment's own piece has all pairs and no list, and so
@@ -104,8 +134,10 @@ class Cover {
     usable = motion.begin(extents, request.bodies, request.body_count);
     work.leaves.clear();
     work.live.clear();
+    work.opened.clear();
+    work.wanted.clear();
     work.proof.clear(request.want_proof != 0);
-    work.pieces = 0;
+    work.pieces = work.part_pairs = 0;
   }
 
   // False if the path is not what kernels can take; nothing is said of it then.
@@ -143,7 +175,7 @@ class Cover {
         if (look(task)) {
           stack.push_back(half(task, true, task.last));
           stack.push_back(half(task, false, task.last));
-        } else if (request.scope == SCOPE_FIRST && work.leaves.back().status != FREE) {
+        } else if (request.scope == SCOPE_FIRST && decided(work.leaves.back())) {
           return;
         }
       }
@@ -164,7 +196,7 @@ class Cover {
         queue.push_back(half(task, true, first));
       } else {
         work.live.resize(first);
-        if (work.leaves.back().status != FREE) given_up = BY_SCOPE;
+        if (decided(work.leaves.back())) given_up = BY_SCOPE;
       }
     }
     std::sort(work.leaves.begin(), work.leaves.end(), [](const Leaf& a, const Leaf& b) {
@@ -173,6 +205,9 @@ class Cover {
              std::ldexp(double(b.start), -int(b.level));
     });
   }
+
+  // Say whether a leaf is known not to become free.
+  static bool decided(const Leaf& leaf) { return leaf.status != FREE && leaf.reason != BY_HULL; }
 
   // Keep of a run of leaves with one status and one reason what tells of the whole: both ends, the
   // smallest gaps, the widest witness.
@@ -209,11 +244,18 @@ class Cover {
     return {piece, first, int64_t(work.live.size()), crowded};
   }
 
+  // Say whether time or budget are spent, with so many pieces examined before.
+  bool exhausted(int64_t pieces) {
+    if (pieces + work.part_pairs / PART_PAIRS >= request.max_pieces)
+      given_up = BY_BUDGET;
+    else if (__atomic_load_n(stop, __ATOMIC_RELAXED) != 0)
+      given_up = BY_STOP;
+    return given_up >= 0;
+  }
+
   // Write a leaf for a piece that nobody will look at any more.
   bool spent(const Piece& piece) {
-    if (given_up < 0 && work.pieces >= request.max_pieces) given_up = BY_BUDGET;
-    if (given_up < 0 && __atomic_load_n(stop, __ATOMIC_RELAXED) != 0) given_up = BY_STOP;
-    if (given_up < 0) return false;
+    if (given_up < 0 && !exhausted(work.pieces)) return false;
     Known nothing{};
     nothing.lower = -INFINITY;
     nothing.upper = INFINITY;
@@ -231,7 +273,8 @@ class Cover {
   // leaf was written.
   bool look(const Task& task) {
     const Piece& piece = task.piece;
-    int64_t examined = ++work.pieces;
+    work.pieces++;
+    int64_t examined = ++work.stamps;
     int64_t first = static_cast<int64_t>(work.live.size());
     crowded = task.whole && !open_all(piece, examined);
     if (crowded) return true;
@@ -276,13 +319,13 @@ class Cover {
 
   // Write proof entries for the pairs that a scan closed.
   void note_closed(const Piece& piece, int64_t examined, int64_t first) {
-    std::vector<char> open(ask.obstacles.count);
+    std::vector<char> open(ask.obstacles.wholes);
     size_t i = first;
     for (int64_t k = 0; k < request.body_count; k++) {
       int64_t b = request.bodies[k];
       std::fill(open.begin(), open.end(), 0);
       for (; i < work.live.size() && work.live[i].body == b; i++) open[work.live[i].obstacle] = 1;
-      for (int64_t o = 0; o < ask.obstacles.count; o++)
+      for (int64_t o = 0; o < ask.obstacles.wholes; o++)
         if (!open[o]) work.proof.add(piece, examined, {BALLS_APART, 0, b, o, {}, 0.0});
     }
   }
@@ -294,7 +337,7 @@ class Cover {
     motion.centre(task.piece);
     for (int64_t i = task.first; i < task.last; i++) {
       Live live = work.live[i].half(task.piece.numerator % 2 != 0);
-      Body& body = motion.stand(live.body, examined);
+      Body& body = stand(live.body, examined);
       if (swept_clear(motion.links, live.body, ask.obstacles, live.obstacle, request.clearance,
                       body))
         work.proof.add(task.piece, examined, {BALLS_APART, 0, live.body, live.obstacle, {}, 0.0});
@@ -321,61 +364,163 @@ class Cover {
   // Examine the open pairs from `first` on: false if the piece must be halved, the pairs that stay
   // open are then the last ones; else a leaf was written.
   bool try_pairs(const Piece& piece, int64_t examined, int64_t first, bool deep) {
-    Known known, worst{};
-    // Of all pairs that stay open, so that it holds for whichever is named, tracking included.
-    double lowest = INFINITY;
-    int64_t status = UNDECIDED, named_body = -1, named_obstacle = -1, named_witness = 0;
+    Ending end;
     int64_t kept = first, last = static_cast<int64_t>(work.live.size());
-    for (int64_t i = first; i < last; i++) {
+    work.extra.clear();
+    for (int64_t i = first; i < last && end.status != COLLISION; i++) {
+      // A pair that is taken apart leaves pairs of parts, which come before all others.
+      work.parts.clear();
       Live live = work.live[i];
-      Body& body = motion.bodies[live.body];
-      if (moving_clear(motion, live.body, ask.obstacles, live.obstacle, request.clearance, body)) {
-        work.proof.add(piece, examined, {BALLS_APART, 0, live.body, live.obstacle, {}, 0.0});
-        continue;
+      for (;;) {
+        if (stays_open(piece, examined, live, deep, end)) {
+          bool fits = kept <= i;
+          if (fits)
+            work.live[kept++] = live;
+          else
+            work.extra.push_back(live);
+          if (end.urgent)
+            std::swap(work.live[first], fits ? work.live[kept - 1] : work.extra.back());
+        }
+        if (work.parts.empty() || end.status == COLLISION) break;
+        live = work.parts.back();
+        work.parts.pop_back();
       }
-      Outcome outcome =
-          examine(motion, ask, piece, examined, live, work.scratch, work.proof, known);
-      if (outcome == Outcome::CLOSED) continue;
-      double lower = known.lower - body.slack;
-      lower -= 4.0 * UNIT_ROUNDOFF * (std::fabs(known.lower) + body.slack);
-      if (!(lower >= lowest)) lowest = lower;
-      double limit = (request.clearance + body.slack) * UP;
-      // The common point may lie off the core, within the ball, and turns with it.
-      int64_t witness =
-          witness_level(known.depth, body.linear + motion.turned(live.body) *
-                                                       motion.links.length(live.body, BALL));
-      // A body that stands in this piece stands in both halves.
-      bool ends = deep || body.sweep == 0.0 ||
-                  settled(known, limit, body.sweep, request.tolerance) ||
-                  (request.scope == SCOPE_VERDICT && witness > 0);
-      bool collides = outcome == Outcome::OVERLAPS;
-      if (collides || (ends && (status != SUSPECT || known.upper < worst.upper))) {
-        status = collides ? COLLISION : SUSPECT;
-        named_body = live.body;
-        named_obstacle = live.obstacle;
-        named_witness = collides ? 0 : witness;
-        worst = known;
-      }
-      if (collides) break;
-      work.live[kept] = live;
-      // What overlaps at the centre is likely to overlap in a half: let it be tried first.
-      if (known.upper < 0.0) std::swap(work.live[first], work.live[kept]);
-      kept++;
     }
-    if (status == UNDECIDED && kept > first) {
+    if (end.status == UNDECIDED && !end.coarse && !end.cut && kept > first) {
       work.live.resize(kept);
+      work.live.insert(work.live.end(), work.extra.begin(), work.extra.end());
       return false;
     }
-    int64_t reason = BY_TOLERANCE;
-    if (status == UNDECIDED) {
-      status = FREE;
-    } else if (status == SUSPECT) {
-      double limit = (request.clearance + motion.bodies[named_body].slack) * UP;
-      if (!(worst.upper <= limit + request.tolerance)) reason = BY_DEPTH;
-    }
-    if (status != FREE) worst.lower = lowest;
-    write(piece, status, reason, named_body, named_obstacle, named_witness, worst);
+    finish(piece, end);
     return true;
+  }
+
+  // Try one pair: true if it stays open; what it says of the piece is added to `end`.
+  bool stays_open(const Piece& piece, int64_t examined, Live& live, bool deep, Ending& end) {
+    Body& body = motion.bodies[live.body];
+    bool part = is_part(motion.links, live.body) || is_part(ask.obstacles, live.obstacle);
+    end.urgent = false;
+    if (part) {
+      // A piece may have any number of them; its own one is not counted yet.
+      end.cut = end.cut || exhausted(work.pieces - 1);
+      if (end.cut || (end.meets && --end.tries < 0)) {
+        end.lowest = -INFINITY;
+        return true;
+      }
+    }
+    if (moving_clear(motion, live.body, ask.obstacles, live.obstacle, request.clearance, body)) {
+      work.proof.add(piece, examined, {BALLS_APART, 0, live.body, live.obstacle, {}, 0.0});
+      return false;
+    }
+    if (part) work.part_pairs++;
+    Known known;
+    Outcome outcome = examine(motion, ask, piece, examined, live, work.scratch, work.proof, known);
+    if (outcome == Outcome::CLOSED) return false;
+    double limit = (request.clearance + body.slack) * UP;
+    // The common point may lie off the core, within the ball, and turns with it.
+    int64_t witness = witness_level(
+        known.depth, body.linear + motion.turned(live.body) * motion.links.length(live.body, BALL));
+    bool collides = outcome == Outcome::OVERLAPS;
+    // A body that stands in this piece stands in both halves.
+    bool ends = deep || body.sweep == 0.0 || settled(known, limit, body.sweep, request.tolerance);
+    // Where a common point is known, no part can show that there is none.
+    if (!(known.depth > 0.0) && take_apart(piece, examined, live, known, limit, ends, end))
+      return false;
+    double lower = known.lower - body.slack;
+    lower -= 4.0 * UNIT_ROUNDOFF * (std::fabs(known.lower) + body.slack);
+    if (!(lower >= end.lowest)) end.lowest = lower;
+    ends = ends || (request.scope == SCOPE_VERDICT && witness > 0);
+    if (collides || (ends && (end.status != SUSPECT || known.upper < end.worst.upper))) {
+      end.status = collides ? COLLISION : SUSPECT;
+      name(live, known, end);
+      end.witness = collides ? 0 : witness;
+    }
+    // What overlaps at the centre is likely to overlap in a half: let it be tried first.
+    bool meets = part && known.upper <= limit;
+    end.urgent = known.upper < 0.0 || known.depth > 0.0 || (meets && !end.meets);
+    end.meets = end.meets || meets;
+    return true;
+  }
+
+  Body& stand(int64_t b, int64_t examined) {
+    return is_part(motion.links, b) ? motion.stand_part(b, examined) : motion.stand(b, examined);
+  }
+
+  static bool is_part(const Solids& solids, int64_t b) { return solids.range(b, WHOLE) != b; }
+
+  static void name(const Live& live, const Known& known, Ending& end) {
+    end.body = live.body;
+    end.obstacle = live.obstacle;
+    end.worst = known;
+  }
+
+  // Replace a pair by those of the larger solid's parts if they could tell more: true if so, or if
+  // they are asked for. Kept out of the way of what every pair runs.
+  __attribute__((noinline)) bool take_apart(const Piece& piece, int64_t examined, const Live& live,
+                                            const Known& known, double limit, bool ends,
+                                            Ending& end) {
+    if (request.want_proof) return false;
+    const Solids &links = motion.links, &obstacles = ask.obstacles;
+    int64_t b = live.body, o = live.obstacle;
+    double mine = links.has_parts(b) ? links.length(b, CORE) : -1.0;
+    double theirs = obstacles.has_parts(o) ? obstacles.length(o, CORE) : -1.0;
+    bool own = mine >= theirs;
+    double size = own ? mine : theirs;
+    if (size < 0.0) return false;
+    bool near = known.upper <= limit + request.tolerance;
+    if (!ends && !(near && motion.bodies[b].sweep <= FINE * size)) return false;
+    const Solids& of = own ? links : obstacles;
+    int64_t whole = own ? b : o;
+    if (of.range(whole, PARTS) == UNBUILT) {
+      work.wanted.push_back({own ? 0 : 1, whole});
+      if (!end.coarse && end.status != SUSPECT) name(live, known, end);
+      end.coarse = true;
+      end.lowest = -INFINITY;
+      return true;
+    }
+    if (!is_part(links, b) && !is_part(obstacles, o))
+      work.opened.push_back({piece.segment, piece.numerator, piece.level, b, o});
+    size_t before = work.parts.size();
+    double distance[2] = {};
+    for (int64_t k = 0; k < 2; k++) {
+      int64_t part = of.range(whole, CHILD) + k;
+      Live pair{own ? part : b, own ? o : part, {}, {}, {}, {}, {}};
+      Body& body = stand(pair.body, examined);
+      if (swept_clear(links, pair.body, obstacles, pair.obstacle, request.clearance, body))
+        continue;
+      if (body.error < 0.0) body.error = motion.fit_error(pair.body);
+      distance[k] = distance_of(body.place, obstacles.at(pair.obstacle, CENTRE));
+      work.parts.push_back(pair);
+    }
+    // The nearer one is the next to be tried.
+    if (work.parts.size() == before + 2 && distance[0] < distance[1])
+      std::swap(work.parts[before], work.parts[before + 1]);
+    return true;
+  }
+
+  static double distance_of(const double* x, const double* y) {
+    double d[3] = {x[0] - y[0], x[1] - y[1], x[2] - y[2]};
+    return norm(d);
+  }
+
+  // Write the leaf of a piece that is not halved.
+  void finish(const Piece& piece, Ending& end) {
+    int64_t reason = BY_TOLERANCE;
+    if (end.cut && end.status != COLLISION) {
+      end.status = SUSPECT;
+      reason = given_up;
+      if (end.body < 0) end.worst.upper = INFINITY;
+    } else if (end.coarse) {
+      end.status = SUSPECT;
+      reason = BY_HULL;
+    } else if (end.status == UNDECIDED) {
+      end.status = FREE;
+    } else if (end.status == SUSPECT) {
+      double limit = (request.clearance + motion.bodies[end.body].slack) * UP;
+      if (!(end.worst.upper <= limit + request.tolerance)) reason = BY_DEPTH;
+    }
+    if (end.status != FREE) end.worst.lower = end.lowest;
+    write(piece, end.status, reason, end.body, end.obstacle, end.witness, end.worst);
   }
 };
 

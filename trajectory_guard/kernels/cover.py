@@ -14,12 +14,14 @@ from trajectory_guard.kernels.layout import (
     ENTRY,
     KernelRefused,
     LEAF,
+    OPENED,
     Packed,
     Path,
     path_structure,
     PathStructure,
     PIECE,
     Request,
+    WANTED,
 )
 
 
@@ -32,6 +34,8 @@ class Covered(NamedTuple):
     :param seconds: wall-clock time in the kernels [s].
     :param entries: (E,) ENTRY, which inequality closed which pair; empty if not asked for.
     :param proved_on: (K,) PIECE that the entries speak of.
+    :param opened: (P,) OPENED, pairs replaced by pairs of parts on pieces.
+    :param wanted: (W,) WANTED, solids whose parts should be built, some more than once.
     """
 
     leaves: np.ndarray
@@ -39,6 +43,8 @@ class Covered(NamedTuple):
     seconds: float
     entries: np.ndarray
     proved_on: np.ndarray
+    opened: np.ndarray
+    wanted: np.ndarray
 
 
 class Question(NamedTuple):
@@ -137,6 +143,8 @@ def cover_all(
             answer.seconds,
             _copied(answer.entries, answer.entry_count, ENTRY),
             _copied(answer.proved_on, answer.piece_count, PIECE),
+            _copied(answer.opened, answer.opened_count, OPENED),
+            _copied(answer.wanted, answer.wanted_count, WANTED),
         )
         for answer in answers
     ]
@@ -144,5 +152,6 @@ def cover_all(
 
 def _copied(pointer: int | None, count: int, dtype: np.dtype) -> np.ndarray:
     """Return a copy of what the kernels will overwrite with the next answers of this thread."""
-    data = ctypes.string_at(pointer, count * dtype.itemsize) if pointer and count else b''
-    return np.frombuffer(data, dtype)
+    if not (pointer and count):
+        return np.empty(0, dtype)
+    return np.frombuffer(ctypes.string_at(pointer, count * dtype.itemsize), dtype)

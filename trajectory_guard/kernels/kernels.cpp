@@ -13,11 +13,13 @@ namespace guard {
 // What a request is answered with; valid until the thread's next requests. No leaves are -1: the
 // path is not what kernels can take.
 struct Answer {
-  int64_t leaf_count, entry_count, piece_count, pieces;
+  int64_t leaf_count, entry_count, piece_count, opened_count, wanted_count, pieces;
   double seconds;
   const Leaf* leaves;
   const Entry* entries;
   const Piece* proved_on;
+  const Opened* opened;
+  const Wanted* wanted;
 };
 
 // Room for the requests of a thread; it stays from call to call.
@@ -49,11 +51,15 @@ int guard_cover(const Chain* chain, const Solids* links, const Solids* obstacles
     answers[i] = {taken ? int64_t(work.leaves.size()) : -1,
                   int64_t(proof.entries.size()),
                   int64_t(proof.pieces.size()),
-                  work.pieces,
+                  int64_t(work.opened.size()),
+                  int64_t(work.wanted.size()),
+                  work.pieces + work.part_pairs / PART_PAIRS,
                   spent.count(),
                   work.leaves.data(),
                   proof.entries.data(),
-                  proof.pieces.data()};
+                  proof.pieces.data(),
+                  work.opened.data(),
+                  work.wanted.data()};
   }
   return 0;
 } catch (const std::bad_alloc&) {

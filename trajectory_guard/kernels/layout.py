@@ -15,7 +15,10 @@ TERMS = 6  # coefficients of a quintic
 LANES = 8
 
 # Columns of `Solids.ranges`.
-FIRST, LAST, FACE_FIRST, FACE_LAST, NODE = range(5)
+FIRST, LAST, FACE_FIRST, FACE_LAST, NODE, WHOLE, PARTS, CHILD = range(8)
+# What PARTS says: nothing finer is known; two finer solids from CHILD on contain the surface;
+# there are such two, but nobody has built them; a triangle of the real surface.
+NO_PARTS, BUILT, UNBUILT, TRIANGLE = range(4)
 # Columns of `Solids.size` [m]: ball, disc, sphere around vertices and disc, farthest point.
 BALL, DISC, CORE, FAR = range(4)
 # Columns of `Floating.bounds`.
@@ -33,7 +36,7 @@ RATIONAL = 1  # exact rational curves: audits, free bodies
 # Status of a leaf; the values of `result.Status`.
 FREE, SUSPECT, COLLISION = 1, 2, 3
 # Why a leaf is suspect.
-BY_TOLERANCE, BY_DEPTH, BY_BUDGET, BY_STOP, BY_SCOPE = range(5)
+BY_TOLERANCE, BY_DEPTH, BY_BUDGET, BY_STOP, BY_SCOPE, BY_HULL, BY_ENCLOSURE = range(7)
 # Kinds of proof entries.
 BALLS_APART, PLANE_BETWEEN, PLANE_TURNING = range(3)
 
@@ -49,6 +52,12 @@ ENTRY = np.dtype(
     [(name, np.int64) for name in ('kind', 'piece', 'body', 'obstacle')]
     + [('n', float, 3), ('m', float, 3), ('k', float, 3), ('offset', float)]
 )
+# A pair of wholes that was replaced by pairs of parts on a piece.
+OPENED = np.dtype(
+    [(name, np.int64) for name in ('segment', 'numerator', 'level', 'body', 'obstacle')]
+)
+# A solid whose parts somebody should build; side 0: the links, 1: the obstacles.
+WANTED = np.dtype([('side', np.int64), ('solid', np.int64)])
 
 
 class Chain(NamedTuple):
@@ -75,8 +84,12 @@ class Solids(NamedTuple):
 
     Vertices and faces of a solid are padded to whole vectors of eight with copies.
 
-    :param ranges: (B, 5) int64: FIRST:LAST vertices, FACE_FIRST:FACE_LAST faces, NODE that
-        carries the solid (-1: the root).
+    Parts come behind all wholes. A part contains some of the surface of its whole, in as much of
+    its vertices' hull as lies in its sphere, and moves with it.
+
+    :param ranges: (B, 8) int64: FIRST:LAST vertices, FACE_FIRST:FACE_LAST faces, NODE that
+        carries the solid (-1: the root), WHOLE that it is a part of (itself if of none), PARTS
+        what is known of its parts, CHILD the first of two if they are BUILT.
     :param size: (B, 4): BALL radius, DISC radius, CORE radius of the sphere around vertices and
         disc, FAR the largest distance of the solid from the frame's origin [m].
     :param place: (B, 21): AXIS unit normal of the disc, CENTRE of the CORE sphere, HALF sides and
@@ -110,7 +123,7 @@ class Boxes(NamedTuple):
 
 class Extents(NamedTuple):
     """
-    How far each body reaches.
+    How far each body that is no part reaches; its parts do not reach farther.
 
     :param extent: (B,) largest distance of a body from its node's origin [m].
     :param perpendicular: (B,) the same from its node's axis [m].
@@ -169,6 +182,7 @@ _Chain = _structure('Chain', nodes=_I, parent=_P, kind=_P, transform=_P, depth=_
 _Solids = _structure(
     'Solids',
     count=_I,
+    wholes=_I,
     ranges=_P,
     size=_P,
     place=_P,
@@ -205,11 +219,15 @@ Answer = _structure(
     leaf_count=_I,
     entry_count=_I,
     piece_count=_I,
+    opened_count=_I,
+    wanted_count=_I,
     pieces=_I,
     seconds=_D,
     leaves=_P,
     entries=_P,
     proved_on=_P,
+    opened=_P,
+    wanted=_P,
 )
 Piece = _structure('Piece', segment=_I, numerator=_I, level=_I)
 
@@ -233,7 +251,7 @@ class Packed:
     :param links: bodies of the robot.
     :param obstacles: bodies of the scene.
     :param boxes: their boxes.
-    :param extents: how far the links reach.
+    :param extents: how far the links reach, parts excluded.
     :raises TypeError: an array is not contiguous or has another type.
     """
 
@@ -258,7 +276,7 @@ class Packed:
             len(boxes.bounds),
             _checked(boxes.bounds, float),
             _checked(boxes.branch, ints),
-            float(obstacles.size[:, FAR].max()),
+            float(obstacles.size[: self.obstacles.wholes, FAR].max()),
         )
         self.extents = _Extents(*(_checked(array, float) for array in extents))
 
@@ -266,6 +284,7 @@ class Packed:
 def _solids(solids: Solids) -> ctypes.Structure:
     return _Solids(
         len(solids.ranges),
+        int((solids.ranges[:, WHOLE] == np.arange(len(solids.ranges))).sum()),
         _checked(solids.ranges, np.int64),
         _checked(solids.size, float),
         _checked(solids.place, float),

@@ -9,7 +9,9 @@ namespace guard {
 enum : int64_t { UNDECIDED, FREE, SUSPECT, COLLISION };
 
 // Why a leaf is suspect.
-enum : int64_t { BY_TOLERANCE, BY_DEPTH, BY_BUDGET, BY_STOP, BY_SCOPE };
+// BY_HULL: parts would tell more, but nobody has built them. BY_ENCLOSURE: the core's, the surfaces
+// keep apart, but one solid may lie inside the other.
+enum : int64_t { BY_TOLERANCE, BY_DEPTH, BY_BUDGET, BY_STOP, BY_SCOPE, BY_HULL, BY_ENCLOSURE };
 
 // What is known about a pair on a piece [m].
 struct Known {
@@ -25,6 +27,16 @@ struct Known {
 struct Leaf {
   int64_t segment, start, end, level, status, reason, body, obstacle, witness;
   Known known;
+};
+
+// A pair of wholes that was replaced by pairs of parts on a piece.
+struct Opened {
+  int64_t segment, numerator, level, body, obstacle;
+};
+
+// A solid whose parts somebody should build; side 0: the links, 1: the obstacles.
+struct Wanted {
+  int64_t side, solid;
 };
 
 }  // namespace guard

@@ -16,6 +16,11 @@ namespace guard {
 // No turn moves a point by more than twice its distance from the axis.
 constexpr double FROZEN = 2.0;
 
+// A vertex of a part may be a corner of a box around points of the whole. Each of its coordinates
+// in the box's axes is one that some point has, so it is within sqrt(3) times what the whole
+// reaches. Only rounding asks for it: the errors of a motion are those of points of the surface.
+constexpr double PART_REACH = 2.0;
+
 struct Node {
   double d[TERMS];     // polynomial of the joint in tau
   double local[POSE];  // pose in the parent's frame at the centre
@@ -39,7 +44,7 @@ struct Body {
   double grown;       // how far an affine motion may stretch the sphere beyond its radius
   double error;       // of the built motion, without tracking and rounding; negative: not yet known
   double radius;      // of the control points of the sphere's centre; negative: not yet known
-  int64_t stands_on;  // number of the piece that the columns above belong to
+  int64_t stands_on;  // number of the piece, never used twice, that the columns above belong to
 };
 
 struct Motion {
@@ -49,14 +54,15 @@ struct Motion {
   int64_t padded;  // joints, in whole vectors
   std::vector<Node>& nodes;
   std::vector<Body>& bodies;
-  // (B, padded) lever arms; rows of `padded`: chord, span, fuzz and fit of the joints.
+  // (wholes, padded) lever arms; rows of `padded`: chord, span, fuzz and fit of the joints.
   std::vector<double>&rho, &chord, &span, &fuzz, &fit;
   FloatingPiece floating{};       // of the floating joint on the piece
   const double* given = nullptr;  // bounds of its segment
   double stretched = 0.0;         // see `stretch`
   double farthest_out = 0.0;      // bound on its translation [m]
 
-  const double* arms(int64_t b) const { return rho.data() + b * padded; }
+  // A part has the lever arms of its whole, which hold for every point of the real surface.
+  const double* arms(int64_t b) const { return rho.data() + links.range(b, WHOLE) * padded; }
 
   // Prepare the bodies of a request; false if the path is not what kernels can take.
   bool begin(const Extents& extents, const int64_t* moved, int64_t count) {
@@ -72,7 +78,7 @@ struct Motion {
     }
     nodes.resize(chain.nodes);
     bodies.resize(links.count);
-    rho.assign(links.count * padded, 0.0);
+    rho.assign(links.wholes * padded, 0.0);
     for (auto* row : {&chord, &span, &fuzz, &fit}) row->assign(padded, 0.0);
     for (int64_t i = 0; i < count; i++) {
       int64_t b = moved[i];
@@ -179,11 +185,26 @@ struct Motion {
     body.sweep = sum(sweep) * UP;
     body.linear = sum(linear) * UP;
     body.fuzz = (sum(off) + chain_margin(chain.depth[node], 1.0, body.reach)) * UP;
-    image(nodes[node].pose, links.at(b, CENTRE), body.place);
+    place(b, body);
+    return body;
+  }
+
+  // The same for a part, which moves as its whole does. Kept out of the way of what every piece
+  // runs.
+  __attribute__((noinline)) Body& stand_part(int64_t b, int64_t piece) {
+    Body& body = bodies[b];
+    if (body.stands_on == piece) return body;
+    body = stand(links.range(b, WHOLE), piece);
+    body.reach *= PART_REACH;
+    place(b, body);
+    return body;
+  }
+
+  void place(int64_t b, Body& body) const {
+    image(nodes[links.range(b, NODE)].pose, links.at(b, CENTRE), body.place);
     body.grown = stretch() * (links.length(b, CORE) + links.length(b, BALL)) * UP;
     body.nearest = INFINITY;
     body.error = body.radius = -1.0;
-    return body;
   }
 
   // Build the polynomial poses of the needed nodes.

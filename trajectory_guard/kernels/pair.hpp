@@ -1,11 +1,12 @@
 // One pair on one piece, from cheap to dear: the swept set, the centre, a turning plane, a common
 // point.
 //
-// Only three comparisons decide: `separation` above the limit and `turning` close the pair, and a
-// common point deeper than its motion proves an overlap. Everything else chooses what they are
-// asked.
+// Only these comparisons decide: `separation` above the limit and `turning` close the pair, and a
+// common point or a crossing deeper than its motion proves an overlap. Everything else chooses what
+// they are asked.
 #pragma once
 
+#include "contact.hpp"
 #include "cull.hpp"
 #include "gjk.hpp"
 #include "proof.hpp"
@@ -168,6 +169,11 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
       }
     }
     if (!(known.upper <= shrunk + body.fuzz + margin)) return Outcome::OPEN;
+    if (links.range(b, PARTS) == TRIANGLE || obstacles.range(o, PARTS) == TRIANGLE)
+      return rigid && contact_witness(links, b, obstacles, o, node, doubt.error + loose,
+                                      body.fuzz + loose, margin, known)
+                 ? Outcome::OVERLAPS
+                 : Outcome::OPEN;
     if (!(deep_start || deep_end) && stands()) return Outcome::OVERLAPS;
   }
   if (node.sound && deep) {

@@ -12,7 +12,10 @@ namespace guard {
 constexpr int64_t REVOLUTE = 0, PRISMATIC = 1, TRANSLATION = 2, ROTATION = 3;
 
 // Columns of Solids::ranges. Vertices and faces are padded to whole vectors with copies.
-enum { FIRST, LAST, FACE_FIRST, FACE_LAST, NODE, RANGES };
+enum { FIRST, LAST, FACE_FIRST, FACE_LAST, NODE, WHOLE, PARTS, CHILD, RANGES };
+// What PARTS says: nothing finer is known; two finer solids contain all of the surface, the first
+// at CHILD; there are such two, but nobody has built them; a triangle of the real surface.
+enum : int64_t { NO_PARTS, BUILT, UNBUILT, TRIANGLE };
 // Columns of Solids::size [m]: ball, disc, sphere around vertices and disc, farthest point.
 enum { BALL, DISC, CORE, FAR, SIZES };
 // Columns of Solids::place: disc normal, sphere centre, box half sides, pose of the box (12).
@@ -30,9 +33,11 @@ struct Chain {
 };
 
 // Convex solids conv(vertices) + disc + ball, end to end; links in node frames, obstacles in the
-// root frame.
+// root frame. The `wholes` come first. Parts follow: each moves with the solid WHOLE and contains
+// some of its real surface, in what of conv(vertices) lies in the sphere. That surface and the
+// sphere's centre do not reach farther than the whole; a vertex may, up to FAR.
 struct Solids {
-  int64_t count;
+  int64_t count, wholes;
   const int64_t* ranges;   // (B, RANGES)
   const double* size;      // (B, SIZES)
   const double* place;     // (B, PLACES)
@@ -44,6 +49,7 @@ struct Solids {
   int64_t range(int64_t b, int column) const { return ranges[b * RANGES + column]; }
   double length(int64_t b, int column) const { return size[b * SIZES + column]; }
   const double* at(int64_t b, int column) const { return place + b * PLACES + column; }
+  bool has_parts(int64_t b) const { return range(b, PARTS) == BUILT || range(b, PARTS) == UNBUILT; }
 };
 
 // Lanes of a block of Boxes: the rotation by columns, the centre, the half sides, the ball and
