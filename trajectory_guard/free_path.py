@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,6 +89,20 @@ class FreePath:
                 Reason.INVALID_PARAMETER,
                 f'unknown_until_ns is {self.unknown_until_ns}, the first knot {knots[0]}',
             )
+
+    @classmethod
+    def exact(
+        cls, motions: Sequence[RationalMotion], knots_ns: Sequence[int], joint_name: str = 'body'
+    ) -> FreePath:
+        """
+        Return the path that control points themselves define, so nothing is off.
+
+        :param motions: S motions, one a segment.
+        :param knots_ns: S + 1 times [ns].
+        :param joint_name: the floating joint, or the body.
+        """
+        zero = np.zeros(len(motions))
+        return cls(joint_name, np.array(knots_ns), tuple(motions), zero, zero, 'control points')
 
     @property
     def duration_ns(self) -> int:

@@ -1,0 +1,1 @@
+"""Rational motions of free bodies from what people have: quaternions, keyframes, splines."""
