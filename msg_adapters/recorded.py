@@ -10,14 +10,17 @@ import numpy as np
 from msg_adapters.bag import Bag, BagMessage
 from msg_adapters.trajectory import (
     joint_state_from_message,
+    multi_dof_from_message,
     stamp_from_message,
     trajectory_from_message,
 )
 from trajectory_guard.errors import Reason, TrajectoryError
+from trajectory_guard.multi_dof import MultiDofTrajectory
 from trajectory_guard.result import NANOSECONDS
 from trajectory_guard.trajectory import JointState, Trajectory
 
 JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
+MULTI_DOF = 'trajectory_msgs/msg/MultiDOFJointTrajectory'
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 DEFAULT_JOINT_STATES = '/joint_states'
 
@@ -37,7 +40,7 @@ class Recorded(NamedTuple):
     """
 
     name: str
-    trajectory: Trajectory | TrajectoryError
+    trajectory: Trajectory | MultiDofTrajectory | TrajectoryError
     start: JointState | None = None
     stamp_ns: int = 0
 
@@ -52,7 +55,7 @@ def recorded_trajectories(
     trajectory is stamped to begin later: the controller leaves for the first point at once.
 
     :param path: folder or storage file.
-    :param topics: JointTrajectory topics; empty: all there are.
+    :param topics: topics of either kind of trajectory; empty: all there are.
     :param joint_state_topics: JointState topics; empty: ``/joint_states`` if it is there.
     :raises TrajectoryError: no such bag or topic; for a damaged bag, after what could be read.
     """
@@ -60,12 +63,12 @@ def recorded_trajectories(
         states = _chosen(bag, JOINT_STATE, joint_state_topics)
         if not joint_state_topics:
             states = [topic for topic in states if topic == DEFAULT_JOINT_STATES]
-        wanted = {JOINT_TRAJECTORY: _chosen(bag, JOINT_TRAJECTORY, topics), JOINT_STATE: states}
+        wanted = {JOINT_STATE: states, **_trajectory_topics(bag, topics)}
         latest: deque[_Measured] = deque(maxlen=LOOK_BACK)
         for messages in _instants(bag.messages(wanted)):
             latest.extend(_Measured(m) for m in messages if m.message_type == JOINT_STATE)
             for message in messages:
-                if message.message_type == JOINT_TRAJECTORY:
+                if message.message_type != JOINT_STATE:
                     yield _recorded(message, latest, path)
 
 
@@ -111,6 +114,24 @@ def _chosen(bag: Bag, message_type: str, topics: Sequence[str]) -> list[str]:
     return list(topics) or there
 
 
+def _trajectory_topics(bag: Bag, topics: Sequence[str]) -> dict[str, list[str]]:
+    """
+    Return the topics to read by their type.
+
+    :param topics: those asked for; empty: all there are.
+    :raises TrajectoryError: a topic that was asked for is not there.
+    """
+    there = {kind: bag.topics(kind) for kind in (JOINT_TRAJECTORY, MULTI_DOF)}
+    for topic in topics:
+        if not any(topic in some for some in there.values()):
+            # Of the type that most bags have, the error names the topics there are.
+            _chosen(bag, JOINT_TRAJECTORY, [topic])
+    return {
+        kind: [topic for topic in some if not topics or topic in topics]
+        for kind, some in there.items()
+    }
+
+
 def _instants(messages: Iterable[BagMessage]) -> Iterator[list[BagMessage]]:
     """
     Yield the messages that were received in the same instant together.
@@ -135,7 +156,8 @@ def _recorded(message: BagMessage, latest: Sequence[_Measured], path: Path) -> R
     name = f'{path}:{message.topic}@{_seconds(message.time_ns)}'
     try:
         content = message.message()
-        trajectory = trajectory_from_message(content, name)
+        poses = message.message_type == MULTI_DOF
+        trajectory = (multi_dof_from_message if poses else trajectory_from_message)(content, name)
         return Recorded(name, trajectory, _merged(latest), stamp_from_message(content))
     except TrajectoryError as error:
         return Recorded(name, TrajectoryError(error.reason, f'{name}: {error}'))

@@ -1,4 +1,4 @@
-"""JointTrajectory as YAML or JSON text, the way ``ros2 topic echo`` prints it."""
+"""Trajectory messages as YAML or JSON text, the way ``ros2 topic echo`` prints them."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -9,8 +9,13 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 from msg_adapters.strict_yaml import plain_value, StrictYamlError
-from msg_adapters.trajectory import stamp_from_message, trajectory_from_message
+from msg_adapters.trajectory import (
+    multi_dof_from_message,
+    stamp_from_message,
+    trajectory_from_message,
+)
 from trajectory_guard.errors import Reason, TrajectoryError
+from trajectory_guard.multi_dof import MultiDofTrajectory
 from trajectory_guard.trajectory import Trajectory
 
 # Ten thousand points of a seven-joint arm take 5 MB; reading this much takes about a minute.
@@ -34,11 +39,11 @@ class Document(NamedTuple):
     """
 
     name: str
-    trajectory: Trajectory | TrajectoryError
+    trajectory: Trajectory | MultiDofTrajectory | TrajectoryError
     stamp_ns: int = 0
 
 
-def trajectories_from_text(text: str, name: str = '') -> Iterator[Trajectory]:
+def trajectories_from_text(text: str, name: str = '') -> Iterator[Trajectory | MultiDofTrajectory]:
     """
     Yield the trajectories of a text in their order.
 
@@ -58,8 +63,9 @@ def documents(text: str, name: str = '') -> Iterator[Document]:
 
     An error is a value here, so that one bad document does not hide the others.
 
-    :param text: YAML documents separated by ``---``, or JSON; a document is a JointTrajectory or
-        a list of them. The header may be missing; unknown keys may not be there.
+    :param text: YAML documents separated by ``---``, or JSON; a document is a JointTrajectory, a
+        MultiDOFJointTrajectory (its points have ``transforms``), or a list of them. The header
+        may be missing; unknown keys may not be there.
     :param name: where the text comes from, for names and errors.
     """
     if len(text) > MAX_CHARACTERS:
@@ -144,8 +150,8 @@ def _document(value: Any, name: str) -> Document:
     """Return the trajectory of a plain value, or why there is none."""
     try:
         message = _message(value)
-        trajectory = trajectory_from_message(message, name)
-        return Document(name, trajectory, stamp_from_message(message))
+        convert = multi_dof_from_message if _has_poses(message) else trajectory_from_message
+        return Document(name, convert(message, name), stamp_from_message(message))
     except TrajectoryError as error:
         return _failed(name, error)
 
@@ -157,9 +163,14 @@ def _failed(name: str, error: TrajectoryError) -> Document:
     )
 
 
+def _has_poses(message: SimpleNamespace) -> bool:
+    """Say whether a message is a MultiDOFJointTrajectory."""
+    return bool(message.points) and hasattr(message.points[0], 'transforms')
+
+
 def _message(value: Any) -> SimpleNamespace:
     """
-    Return the plain value of a document as a JointTrajectory message.
+    Return the plain value of a document as a message; its points are all of the first one's kind.
 
     :raises TrajectoryError: the layout is another one, or a value is of another type.
     """
@@ -167,13 +178,13 @@ def _message(value: Any) -> SimpleNamespace:
         found = f'keys {shown(sorted(value))}' if isinstance(value, dict) else shown(value)
         raise _unreadable(f'expected a mapping with joint_names and points, found {found}')
     _refuse_unknown(value, {'header', 'joint_names', 'points'}, 'the trajectory')
+    points = _items(value['points'], 'points')
+    poses = bool(points) and isinstance(points[0], dict) and 'transforms' in points[0]
+    read = _pose_point if poses else _point
     return SimpleNamespace(
         header=_header(value['header']) if 'header' in value else None,
         joint_names=_strings(value['joint_names'], 'joint_names'),
-        points=[
-            _point(point, f'points[{index}]')
-            for index, point in enumerate(_items(value['points'], 'points'))
-        ],
+        points=[read(point, f'points[{index}]') for index, point in enumerate(points)],
     )
 
 
@@ -202,6 +213,55 @@ def _point(value: Any, field: str) -> SimpleNamespace:
         time_from_start=_time(value['time_from_start'], f'{field}.time_from_start'),
         **{name: _numbers(value.get(name, []), f'{field}.{name}') for name in arrays},
     )
+
+
+def _pose_point(value: Any, field: str) -> SimpleNamespace:
+    """
+    Return the plain value of a point as MultiDOFJointTrajectoryPoint message.
+
+    :param value: the plain value.
+    :param field: its name in the document.
+    """
+    twist = {'linear': 'xyz', 'angular': 'xyz'}
+    layouts = {
+        'transforms': {'translation': 'xyz', 'rotation': 'xyzw'},
+        'velocities': twist,
+        'accelerations': twist,
+    }
+    if not isinstance(value, dict) or 'time_from_start' not in value:
+        raise _unreadable(f'{field}: expected a mapping with time_from_start')
+    _refuse_unknown(value, {*layouts, 'time_from_start'}, field)
+    return SimpleNamespace(
+        time_from_start=_time(value['time_from_start'], f'{field}.time_from_start'),
+        **{
+            name: [
+                SimpleNamespace(
+                    **{
+                        part: _vector(_part(item, part, layout, place), keys, f'{place}.{part}')
+                        for part, keys in layout.items()
+                    }
+                )
+                for k, item in enumerate(_items(value.get(name, []), f'{field}.{name}'))
+                for place in [f'{field}.{name}[{k}]']
+            ]
+            for name, layout in layouts.items()
+        },
+    )
+
+
+def _part(value: Any, part: str, layout: dict[str, str], field: str) -> Any:
+    """Return a part of a transform or twist that has all its parts and no other."""
+    if not isinstance(value, dict) or value.keys() != layout.keys():
+        raise _unreadable(f'{field}: expected {" and ".join(layout)}, found {shown(value)}')
+    return value[part]
+
+
+def _vector(value: Any, keys: str, field: str) -> SimpleNamespace:
+    """Return a mapping of numbers as geometry_msgs/Vector3 or Quaternion message."""
+    if not isinstance(value, dict) or value.keys() != set(keys):
+        raise _unreadable(f'{field}: expected {", ".join(keys)}, found {shown(value)}')
+    numbers = _numbers([value[key] for key in keys], field)
+    return SimpleNamespace(**dict(zip(keys, numbers, strict=True)))
 
 
 def _time(value: Any, field: str) -> SimpleNamespace:

@@ -1,4 +1,4 @@
-"""trajectory_msgs/JointTrajectory and sensor_msgs/JointState to core values."""
+"""JointTrajectory, MultiDOFJointTrajectory and JointState messages to core values."""
 
 import math
 import operator
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from trajectory_guard.errors import Reason, TrajectoryError
+from trajectory_guard.multi_dof import MultiDofTrajectory, PosePoint
 from trajectory_guard.result import NANOSECONDS
 from trajectory_guard.trajectory import JointState, Point, Trajectory
 
@@ -50,6 +51,54 @@ def trajectory_from_message(message: Any, name: str = '') -> Trajectory:
         )
     joint_names = tuple(_field(message, 'joint_names', 'the trajectory'))
     return Trajectory.from_points(joint_names, points, name=name)
+
+
+def multi_dof_from_message(message: Any, name: str = '') -> MultiDofTrajectory:
+    """
+    Return the poses in time that a MultiDOFJointTrajectory message describes.
+
+    The header is not read; see :func:`stamp_from_message`.
+
+    :param message: anything with the fields of trajectory_msgs/MultiDOFJointTrajectory.
+    :param name: label of the trajectory in the result.
+    :raises TrajectoryError: a field is missing, or the trajectory is not one that can be played.
+    """
+    points = []
+    for index, point in enumerate(_field(message, 'points', 'the trajectory')):
+        owner = f'points[{index}]'
+        points.append(
+            PosePoint(
+                nanoseconds_from_message(_field(point, 'time_from_start', owner)),
+                _rows(point, 'transforms', owner, (('translation', 'xyz'), ('rotation', 'xyzw'))),
+                _rows(point, 'velocities', owner, _TWIST),
+                _rows(point, 'accelerations', owner, _TWIST),
+            )
+        )
+    joint_names = tuple(_field(message, 'joint_names', 'the trajectory'))
+    return MultiDofTrajectory.from_points(joint_names, points, name=name)
+
+
+_TWIST = (('linear', 'xyz'), ('angular', 'xyz'))
+
+
+def _rows(
+    point: Any, name: str, owner: str, parts: tuple[tuple[str, str], ...]
+) -> list[list[float]]:
+    """Return the numbers of each transform or twist of a point, in their order."""
+    rows = []
+    for k, item in enumerate(_field(point, name, owner)):
+        place = f'{owner}.{name}[{k}]'
+        try:
+            rows.append(
+                [
+                    float(_field(_field(item, part, place), key, f'{place}.{part}'))
+                    for part, keys in parts
+                    for key in keys
+                ]
+            )
+        except (TypeError, ValueError) as error:
+            raise TrajectoryError(Reason.TRAJECTORY_UNREADABLE, f'{place}: {error}') from error
+    return rows
 
 
 def stamp_from_message(message: Any) -> int:

@@ -10,12 +10,14 @@ import numpy as np
 
 from trajectory_guard.certificate import certificate
 from trajectory_guard.deadline import stop_flag
-from trajectory_guard.errors import Reason, TrajectoryGuardError
-from trajectory_guard.floating_path import floating_path
+from trajectory_guard.errors import Reason, RequestError, TrajectoryGuardError
+from trajectory_guard.floating_path import floating_joint_in, floating_path
 from trajectory_guard.free_path import FreePath
 from trajectory_guard.joint_path import joint_path, JointPath
 from trajectory_guard.kernels.cover import Covered, Question
 from trajectory_guard.kernels.layout import KernelRefused, Path
+from trajectory_guard.multi_dof import MultiDofTrajectory
+from trajectory_guard.multi_dof_path import multi_dof_path
 from trajectory_guard.refine import cover_refined, Seen
 from trajectory_guard.request import check_joints, motion_path, refusal, tracking_slack
 from trajectory_guard.result import Interval, NANOSECONDS, Result, Status, Verdict
@@ -78,7 +80,7 @@ def certify(
 
 def judge(
     workcell: Workcell,
-    trajectory: Trajectory,
+    trajectory: Trajectory | MultiDofTrajectory,
     start: JointState | None = None,
     settings: Settings | None = None,
 ) -> Result:
@@ -86,7 +88,7 @@ def judge(
     Certify a trajectory message; whatever goes wrong is an answer, and never *free*.
 
     :param workcell: robot and scene.
-    :param trajectory: the message.
+    :param trajectory: the message; poses in time are those of the robot's floating joint.
     :param start: where the robot is at time 0.
     :param settings: what is asked; the defaults if None.
     """
@@ -96,7 +98,7 @@ def judge(
 
 def judge_some(
     workcell: Workcell,
-    asked: Sequence[tuple[Trajectory, JointState | None]],
+    asked: Sequence[tuple[Trajectory | MultiDofTrajectory, JointState | None]],
     settings: Settings | None = None,
 ) -> list[Result]:
     """
@@ -144,11 +146,17 @@ def _rejected(error: Exception, settings: Settings, name: str) -> Result:
 
 
 def _job_of(
-    workcell: Workcell, trajectory: Trajectory, start: JointState | None, settings: Settings
+    workcell: Workcell,
+    trajectory: Trajectory | MultiDofTrajectory,
+    start: JointState | None,
+    settings: Settings,
 ) -> _Job:
     """Return the curve of a trajectory, ready for the kernels."""
     begin = time.perf_counter()
     movable = workcell.robot.movable
+    if isinstance(trajectory, MultiDofTrajectory):
+        path = _poses_path(workcell, trajectory, start, settings)
+        return _job(workcell, path, tracking_slack(movable, path, _moved(path), settings), begin)
     path = joint_path(
         movable,
         trajectory,
@@ -161,6 +169,24 @@ def _job_of(
     return _job(
         workcell, path, tracking_slack(movable, path, trajectory.joint_names, settings), begin
     )
+
+
+def _poses_path(
+    workcell: Workcell,
+    trajectory: MultiDofTrajectory,
+    start: JointState | None,
+    settings: Settings,
+) -> JointPath:
+    """Return the path of a robot whose floating joint is told its poses."""
+    if settings.want_certificate:
+        raise RequestError(
+            Reason.INVALID_PARAMETER, 'certificates are written of joint trajectories only'
+        )
+    joint = floating_joint_in(workcell.robot, trajectory.joint_names)
+    free = multi_dof_path(
+        trajectory, joint, allow_nonzero_end_velocity=settings.allow_nonzero_end_velocity
+    )
+    return floating_path(workcell.robot, free, start)
 
 
 def _moved(path: JointPath) -> tuple[str, ...]:
@@ -184,7 +210,7 @@ def _cover(workcell: Workcell, jobs: Sequence[_Job], settings: Settings) -> list
 
 def _result(
     workcell: Workcell,
-    trajectory: Trajectory,
+    trajectory: Trajectory | MultiDofTrajectory,
     start: JointState | None,
     job: _Job,
     seen: Seen | None,
@@ -192,7 +218,7 @@ def _result(
 ) -> Result:
     """Return the answer to a trajectory, with its certificate if one is wanted."""
     answer = _answer(workcell, job, seen, settings, trajectory.name)
-    if not settings.want_certificate:
+    if not settings.want_certificate or isinstance(trajectory, MultiDofTrajectory):
         return answer.result
     proof = certificate(workcell, trajectory, start, job.path, job.slack, *answer)
     return dataclasses.replace(answer.result, certificate=proof)

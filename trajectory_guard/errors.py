@@ -31,6 +31,7 @@ class Reason(str, Enum):
     JOINT_POSITION_UNKNOWN = 'joint_position_unknown'
     TOO_LARGE = 'too_large'
     TRAJECTORY_UNREADABLE = 'trajectory_unreadable'
+    AMBIGUOUS_TURN = 'ambiguous_turn'
 
     # The robot.
     ROBOT_INVALID = 'robot_invalid'

@@ -26,16 +26,7 @@ def floating_path(robot: Robot, free: FreePath, start: JointState | None = None)
     :raises TrajectoryError: the robot has no floating joint, or one of another name, or a joint's
         position is unknown.
     """
-    name = robot.floating
-    if name is None:
-        raise TrajectoryError(
-            Reason.UNKNOWN_JOINT, f'robot {robot.name!r} has no floating joint {free.joint_name!r}'
-        )
-    if name not in (ANY_NAME, free.joint_name):
-        raise TrajectoryError(
-            Reason.UNKNOWN_JOINT,
-            f'the robot has no floating joint {free.joint_name!r}; it has {name!r}',
-        )
+    floating_joint_in(robot, (free.joint_name,))
     joints = robot.movable
     coefficients = np.zeros((len(free.motions), len(joints), 6))
     error = np.zeros((len(free.motions), len(joints)))
@@ -52,6 +43,30 @@ def floating_path(robot: Robot, free: FreePath, start: JointState | None = None)
         limits_checked=True,
         floating=free,
     )
+
+
+def floating_joint_in(robot: Robot, names: Sequence[str]) -> int:
+    """
+    Return which of a message's joints is the robot's floating one: it must be the only one.
+
+    :param robot: the robot.
+    :param names: the message's.
+    :raises TrajectoryError: the robot has no floating joint, or one of another name; or the
+        message names more than that.
+    """
+    own = robot.floating
+    told = ', '.join(map(repr, names))
+    if own is None:
+        raise TrajectoryError(
+            Reason.UNKNOWN_JOINT,
+            f'robot {robot.name!r} has no floating joint, the poses are of {told}',
+        )
+    if len(names) != 1 or own not in (ANY_NAME, names[0]):
+        only = 'one body' if own == ANY_NAME else f'the floating joint {own!r}'
+        raise TrajectoryError(
+            Reason.UNKNOWN_JOINT, f'poses of {only} are expected, the message has {told}'
+        )
+    return 0
 
 
 def _held(joints: Sequence[Joint], start: JointState | None) -> list[float]:

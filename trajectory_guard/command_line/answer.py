@@ -14,11 +14,12 @@ from trajectory_guard.command_line.request import Request, SELF_COLLISION_WARNIN
 from trajectory_guard.command_line.sources import Selection, Source, sources
 from trajectory_guard.command_line.start import completed, depends_on_duration, without
 from trajectory_guard.errors import Reason, RequestError, TrajectoryError
+from trajectory_guard.free_body import load_moving
+from trajectory_guard.multi_dof import MultiDofTrajectory
 from trajectory_guard.pose import pose_matrix
 from trajectory_guard.result import Result
 from trajectory_guard.robot import Robot
 from trajectory_guard.scene import load_scene
-from trajectory_guard.urdf import load_robot
 from trajectory_guard.warm import warm_up
 from trajectory_guard.workcell import Workcell
 
@@ -40,7 +41,7 @@ def answers(request: Request) -> Iterator[Result]:
     :param request: what to judge, against what.
     :raises TrajectoryGuardError: robot, scene or start state cannot be used, so nothing can.
     """
-    robot = load_robot(request.urdf)
+    robot = load_moving(request.urdf)
     _check_names(robot, request.start)
     workcell = Workcell(robot, load_scene(request.scenes, _matrix(request.scene_pose)))
     # Else the first answer's time would be that of loading or compiling the kernels.
@@ -77,10 +78,13 @@ def _answer(source: Source, workcell: Workcell, request: Request) -> Result:
     if isinstance(source.trajectory, TrajectoryError):
         return Result.rejected(source.trajectory, request.settings, source.name)
     start = completed(source.start, request.start)
-    warnings = [UNMEASURED] if source.recorded and source.start is None else []
+    measured = source.start is not None or isinstance(source.trajectory, MultiDofTrajectory)
+    warnings = [UNMEASURED] if source.recorded and not measured else []
     if source.stamp_ns:
         warnings.append(STAMPED)
-        if depends_on_duration(source.trajectory, start):
+        if isinstance(source.trajectory, MultiDofTrajectory):
+            pass  # nothing is known of the way to its first point in any case
+        elif depends_on_duration(source.trajectory, start):
             warnings.append(APPROACH_UNKNOWN)
             start = without(start, source.trajectory.joint_names)
     if request.self_collision:

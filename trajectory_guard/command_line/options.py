@@ -126,7 +126,12 @@ _FILE: dict[str, Any] = {'exists': True, 'dir_okay': False, 'readable': True}
 _LENGTH: dict[str, Any] = {'metavar': 'METRES', 'show_default': True}
 
 Urdf = Annotated[
-    Path, typer.Option(**_FILE, metavar='FILE', help='Robot, with collision geometry.')
+    Path,
+    typer.Option(
+        **_FILE,
+        metavar='FILE',
+        help='Robot with collision geometry, or the mesh file of a free body.',
+    ),
 ]
 Scenes = Annotated[
     list[Path],

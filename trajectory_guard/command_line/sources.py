@@ -8,6 +8,7 @@ from msg_adapters.bag import is_bag
 from msg_adapters.recorded import recorded_trajectories
 from msg_adapters.text import documents, MAX_CHARACTERS
 from trajectory_guard.errors import Reason, TrajectoryError
+from trajectory_guard.multi_dof import MultiDofTrajectory
 from trajectory_guard.trajectory import JointState, Trajectory
 
 
@@ -23,7 +24,7 @@ class Source(NamedTuple):
     """
 
     name: str
-    trajectory: Trajectory | TrajectoryError
+    trajectory: Trajectory | MultiDofTrajectory | TrajectoryError
     start: JointState | None = None
     stamp_ns: int = 0
     recorded: bool = False
@@ -33,7 +34,7 @@ class Selection(NamedTuple):
     """
     What is read of bags.
 
-    :param topics: JointTrajectory topics; empty: all.
+    :param topics: topics of trajectories of either kind; empty: all.
     :param joint_state_topics: JointState topics; empty: ``/joint_states``.
     """
 

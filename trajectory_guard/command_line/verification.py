@@ -105,7 +105,8 @@ def _trajectories(paths: Sequence[Path]) -> dict[str, Trajectory]:
         for source in sources(path, Selection()):
             if isinstance(source.trajectory, TrajectoryError):
                 error = error or source.trajectory
-            else:
+            elif isinstance(source.trajectory, Trajectory):
+                # Certificates are written of no others.
                 found[source.trajectory.digest()] = source.trajectory
     if error is not None and not found:
         raise error

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from msg_adapters.text import trajectories_from_text
 from trajectory_guard.demo.files import config_file
 from trajectory_guard.demo.poses import Sampled
+from trajectory_guard.errors import Reason, TrajectoryError
 from trajectory_guard.result import Result, Status, Verdict
 from trajectory_guard.trajectory import Trajectory
 
@@ -48,6 +49,10 @@ class Case(NamedTuple):
         """
         text = config_file(self.file).read_text(encoding='utf-8')
         (trajectory,) = trajectories_from_text(text, self.file)
+        if not isinstance(trajectory, Trajectory):
+            raise TrajectoryError(
+                Reason.TRAJECTORY_UNREADABLE, f'{self.file} has poses, not joint positions'
+            )
         return trajectory
 
     def start(self) -> dict[str, float]:
