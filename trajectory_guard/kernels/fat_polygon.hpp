@@ -63,7 +63,7 @@ struct Fatness {
   // Best where rho is `rate`; k is kept where (1 + 1/k) r^2 is r^2 as good as exactly.
   Fatness(double radius, double rate, double thickness) {
     double a = radius * rate;
-    double k = a * 0x1p20 > thickness ? thickness / a : 0x1p20;
+    double k = a * 0x1p40 > thickness ? thickness / a : 0x1p40;
     lambda = (1.0 + k) * radius * radius * UP;
     c = k > 0.0 ? (1.0 + 1.0 / k) * thickness * thickness * UP : 0.0;
   }
