@@ -163,13 +163,15 @@ def test_ball_contains_the_curve(scale):
         homogeneous = np.column_stack([points, np.ones(5)])
         triangle = surface(Polyhedron(points[:3], (np.arange(3),)))
         metric = node_metric(triangle, False, given_moments(homogeneous.T @ homogeneous))
-        radius, centre = ball_calls.radius(metric, curve)
+        radius, (shift, turn), centre = ball_calls.radius(metric, curve)
         frame = exact(metric.frame[0])
         b, K = frame[:3], frame[3:].reshape(3, 3)
         for P in exact(curve.points).reshape(-1, 3, 4):
             D = P - exact(centre)
             moved, turned = D[:, :3] @ b + D[:, 3], D[:, :3] @ K
             assert Fraction(radius) ** 2 >= moved @ moved + (turned * turned).sum()
+            assert Fraction(shift) ** 2 >= moved @ moved
+            assert Fraction(turn) ** 2 >= (turned * turned).sum()
         # The metric is that of the feature points, mass 1.
         P = curve.points.reshape(-1, 3, 4)
         far = max(np.sqrt(((homogeneous @ (Q - centre).T) ** 2).sum() / len(points)) for Q in P)
@@ -196,8 +198,27 @@ def test_distortion_rate_bounds_every_displacement():
                     ((D[:, :3] @ b + D[:, 3]) ** 2).sum() + ((D[:, :3] @ K) ** 2).sum()
                 )
                 moved = np.linalg.norm(x @ D[:, :3].T + D[:, 3], axis=1)
-                assert (moved <= length * metric.rate[node] * (1 + 1e-9)).all()
+                assert (moved <= length * np.hypot(1.0, metric.far[node]) * (1 + 1e-9)).all()
         assert metric.residual < 1e-12
+
+
+@pytest.mark.parametrize('far', [0.0, 1.0, 2.0])
+def test_extent_of_a_distribution(far):
+    """Any extent is that of a distribution, and the best moves no point by more than T + W f."""
+    for shift, turn in ((1.0, 1.0), (1.0, 1e-3), (1e-3, 1.0), (1.0, 0.0), (0.0, 1.0), (1e-6, 1e6)):
+        for adapted in (False, True):
+            whole = np.nextafter(np.hypot(shift, turn), 9e9)
+            radius, spread, uncertain = map(
+                Fraction, ball_calls.rate(whole, shift, turn, far, adapted)
+            )
+            assert radius**2 >= Fraction(shift) ** 2 + Fraction(turn) ** 2 / spread
+            assert uncertain**2 >= radius**2 * (1 + spread * Fraction(far) ** 2)
+            if adapted:
+                # Extents are kept within 2^20 either way.
+                loose = 1e-6 * (shift + turn)
+                assert float(uncertain) == pytest.approx(shift + turn * far, rel=1e-9, abs=loose)
+    for broken in (np.nan, np.inf):
+        assert not ball_calls.rate(broken, broken, broken, far, True)[2] < 1e300
 
 
 # Listing 2 and the static test
@@ -212,7 +233,7 @@ def listing_2(moving, fixed, radius, thickness=1e-12):
     """Test two single faces, the moving one where it stands, with its own distribution."""
     metric = node_metric(surface(moving), True)
     return ball_calls.apart(
-        surface(moving), surface(fixed), metric.turned, radius, metric.rate[0], thickness, 1e-14
+        surface(moving), surface(fixed), metric.turned, radius, metric.far[0], thickness, 1e-14
     )
 
 
@@ -231,7 +252,7 @@ def test_pierced_square_is_not_apart():
     radius = 0.05 / np.sqrt(5.0)
     for r in (radius, 0.0):
         done, kind = ball_calls.apart(
-            surface(square), surface(triangle), metric.turned, r, metric.rate[0], 1e-12, 1e-14
+            surface(square), surface(triangle), metric.turned, r, metric.far[0], 1e-12, 1e-14
         )
         assert not done
         assert kind in (EDGE_PIERCES, FACE_PIERCED)
@@ -328,7 +349,7 @@ def test_large_radii_need_no_hyperboloids():
     square = one_face(SQUARE)
     for height in (1.0, 4.0, 10.0, 30.0):
         above = one_face(square.vertices * 0.3 + [0, 0, height])
-        rate = node_metric(surface(square), True).rate[0]
+        rate = np.hypot(1.0, node_metric(surface(square), True).far[0])
         for radius in (0.5, 1.0, 3.0, 10.0):
             if listing_2(square, above, radius)[0]:
                 assert radius * rate < np.hypot(height, 0.7 * np.sqrt(2.0)) + 1e-9

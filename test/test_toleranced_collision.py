@@ -98,11 +98,18 @@ def test_free_intervals_hold_no_contact(seed):
     moving = scaled([tetrahedron(rng), angle_prism()][seed % 2], scale)
     fixed = scaled([box((0.3, 0.2, 0.4)), tetrahedron(rng), angle_prism(0.5)][seed % 3], scale)
     motion = random_curve(rng, scale)
-    for individual in (True, False):
-        found = collide(moving, fixed, motion, epsilon=0.02 * scale, individual=individual)
+    for individual, adapted in ((True, True), (True, False), (False, True)):
+        found = collide(
+            moving,
+            fixed,
+            motion,
+            epsilon=0.02 * scale,
+            individual=individual,
+            adapted=adapted,
+        )
         check_partition(found)
         ends = [Fraction(x) for span in found.free for x in span]
-        for s in {*(Fraction(k, 24) for k in range(25)), *ends}:
+        for s in {*(Fraction(k, 16) for k in range(17)), *ends}:
             if is_free(found, s):
                 assert not in_contact(moving, fixed, motion, s)
 

@@ -19,6 +19,12 @@
 //
 // covers with what forming it costs. M_C and M_t are the largest entries of the linear parts and of
 // the translations.
+//
+// **Extent.** With T the largest |C b + t| and W the largest ||C K||_F of the differences the
+// distribution of sigma times the extent has R^2 <= T^2 + sigma^2 W^2, and on |q| <= f it moves no
+// point by more than R rho <= sqrt((T^2 + sigma^2 W^2) (1 + f^2 / sigma^2)). That is least, T + W f,
+// for sigma^2 = T f / W: a small distribution where the motion turns, a large one where it shifts.
+// Any sigma is sound.
 #pragma once
 
 #include <vector>
@@ -37,6 +43,31 @@ struct Curve {
   int64_t degree;
   const double* points;   // (degree + 1, 12)
   const double* weights;  // (degree + 1,) positive
+};
+
+// Radius of a ball in a distribution's metric, and the parts T and W of it.
+struct Radius {
+  double whole, shift, turn;
+};
+
+// The distribution of a face or cluster: radius of the ball in its metric, and rho^2 = 1 + |q|^2 *
+// spread.
+struct Rate {
+  double radius, spread, uncertain;
+
+  // far: bound on |q|. Sigma is 1, or the best one.
+  Rate(const Radius& r, double far, bool adapted) : radius(r.whole), spread(1.0) {
+    if (adapted) {
+      double square = r.shift * far / r.turn;
+      // Not only infinity and zero: a turn, or a shift, of nothing but rounding.
+      square = square > SMALLEST ? (square < 1.0 / SMALLEST ? square : 1.0 / SMALLEST) : SMALLEST;
+      spread = 1.0 / square;
+      radius = std::sqrt(r.shift * r.shift + square * UP * r.turn * r.turn) * UP;
+    }
+    uncertain = radius * std::sqrt(1.0 + spread * far * far) * UP;
+  }
+
+  static constexpr double SMALLEST = 0x1p-40;
 };
 
 // Homogeneous control points of a piece: rows of 12 numerators and a weight.
@@ -110,28 +141,34 @@ struct Ball {
   }
 
   // The radius in a distribution's metric; infinite if it is not a number.
-  double radius(const Metric& metric, int64_t which) const {
+  Radius radius(const Metric& metric, int64_t which) const {
     const double* b = metric.frame + FRAME_SIZE * which + FRAME_CENTRE;
     const double* k = metric.frame + FRAME_SIZE * which + FRAME_AXES;
-    double most = 0.0, total = 0.0;
+    double most = 0.0, most_shift = 0.0, most_turn = 0.0, total = 0.0;
     for (size_t i = 0; i < lanes; i += LANES) {
-      Lanes square = all(0.0);
+      Lanes shift = all(0.0), turn = all(0.0);
       for (int r = 0; r < ENTRIES; r += 4) {
         const double* row = &difference[r * lanes + i];
         Lanes x = load(row), y = load(row + lanes), z = load(row + 2 * lanes);
         Lanes moved = x * b[0] + y * b[1] + z * b[2] + load(row + 3 * lanes);
-        square += moved * moved;
+        shift += moved * moved;
         for (int c = 0; c < 3; c++) {
           Lanes turned = x * k[c] + y * k[3 + c] + z * k[6 + c];
-          square += turned * turned;
+          turn += turned * turned;
         }
       }
-      for (int lane = 0; lane < LANES; lane++) most = square[lane] > most ? square[lane] : most;
+      Lanes square = shift + turn;
+      for (int lane = 0; lane < LANES; lane++) {
+        most = square[lane] > most ? square[lane] : most;
+        most_shift = shift[lane] > most_shift ? shift[lane] : most_shift;
+        most_turn = turn[lane] > most_turn ? turn[lane] : most_turn;
+      }
       total += sum(square);
     }
-    if (!(total < INFINITY)) return INFINITY;
+    if (!(total < INFINITY)) return {INFINITY, INFINITY, INFINITY};
     double rounding = RADIUS * UNIT_ROUNDOFF * (size.linear * metric.span[which] + size.shift);
-    return (std::sqrt(most) + rounding) * UP;
+    auto up = [&](double square) { return (std::sqrt(square) + rounding) * UP; };
+    return {up(most), up(most_shift), up(most_turn)};
   }
 
   void image(const double* x, double* y) const {

@@ -63,7 +63,7 @@ class Metric(NamedTuple):
     :param frame: (M, 12) barycentre b and K by rows, the inertia is K K^T, the mass 1 [m].
     :param span: (M,) at least |b| + |K| [m].
     :param of: (N,) int64 distribution of each node.
-    :param rate: (N,) at least the distortion rate in the node's box or face.
+    :param far: (N,) at least |q| in the node's box or face.
     :param turned: (C, 3) q = K^-1 (x - b) of each corner, K and b of its face.
     :param residual: at least |x - b - K q| everywhere [m].
     """
@@ -71,7 +71,7 @@ class Metric(NamedTuple):
     frame: np.ndarray
     span: np.ndarray
     of: np.ndarray
-    rate: np.ndarray
+    far: np.ndarray
     turned: np.ndarray
     residual: float
 
@@ -100,6 +100,7 @@ class Limits(NamedTuple):
     :param max_depth: halvings.
     :param max_tests: tests of clusters and of polygons before the rest is given up as suspect.
     :param plain: every pair of faces by itself (Listing 1 as printed).
+    :param adapted: every ball has the extent of distributions that suits it.
     """
 
     clearance: float
@@ -109,6 +110,7 @@ class Limits(NamedTuple):
     max_depth: int
     max_tests: int
     plain: bool
+    adapted: bool
 
 
 class Counts(NamedTuple):
@@ -158,7 +160,7 @@ _Surface = _structure(
     nodes=_I,
     reach=_D,
 )
-_Metric = _structure('Metric', count=_I, frame=_P, span=_P, of=_P, rate=_P, turned=_P, residual=_D)
+_Metric = _structure('Metric', count=_I, frame=_P, span=_P, of=_P, far=_P, turned=_P, residual=_D)
 _Curve = _structure('Curve', degree=_I, points=_P, weights=_P)
 _Request = _structure(
     'Request',
@@ -169,6 +171,7 @@ _Request = _structure(
     max_depth=_I,
     max_tests=_I,
     plain=_I,
+    adapted=_I,
     numerator=_I,
     level=_I,
     until=_I,
@@ -186,10 +189,25 @@ _Answer = _structure(
 )
 
 
+class Packed:
+    """
+    What a cover is about; holds the arrays that the structures point to.
+
+    :param moving: in its own frame.
+    :param fixed: in the frame of the motion's images.
+    :param metric: of the moving surface.
+    :raises TypeError: an array is not contiguous or has another type.
+    """
+
+    def __init__(self, moving: Surface, fixed: Surface, metric: Metric) -> None:
+        self._held = moving, fixed, metric
+        self.moving_faces = len(moving.corner_first) - 1
+        self.fixed_faces = len(fixed.corner_first) - 1
+        self.structures = _surface(moving), _surface(fixed), _metric(metric)
+
+
 def cover(
-    moving: Surface,
-    fixed: Surface,
-    metric: Metric,
+    packed: Packed,
     curve: Curve,
     limits: Limits,
     stop: np.ndarray,
@@ -200,9 +218,7 @@ def cover(
     """
     Cover one piece of a motion, without the interpreter's lock.
 
-    :param moving: in its own frame.
-    :param fixed: in the frame of the motion's images.
-    :param metric: of the moving surface.
+    :param packed: the surfaces and the metric.
     :param curve: the motion.
     :param limits: what is asked.
     :param stop: (1,) int64; another thread sets it non-zero to have the rest given up.
@@ -211,12 +227,10 @@ def cover(
     :param until: level at which open pieces are handed back as pending; -1: never.
     :raises MemoryError: there is not enough.
     """
-    tests_of = np.zeros(len(moving.corner_first) - 1, np.int64)
+    tests_of = np.zeros(packed.moving_faces, np.int64)
     answer = _Answer()
     status = load(UNIT).guard_ball_cover(
-        ctypes.byref(_surface(moving)),
-        ctypes.byref(_surface(fixed)),
-        ctypes.byref(_metric(metric)),
+        *map(ctypes.byref, packed.structures),
         ctypes.byref(_curve(curve)),
         ctypes.byref(_Request(*limits, *piece, until)),
         _P(_checked(pairs, np.int64)),
@@ -258,7 +272,7 @@ def _metric(metric: Metric) -> ctypes.Structure:
         _checked(metric.frame, np.float64),
         _checked(metric.span, np.float64),
         _checked(metric.of, np.int64),
-        _checked(metric.rate, np.float64),
+        _checked(metric.far, np.float64),
         _checked(metric.turned, np.float64),
         metric.residual,
     )

@@ -47,6 +47,7 @@ struct BallRequest {
   double epsilon;                             // [m]
   int64_t max_depth, max_tests;
   int64_t plain;             // every pair of faces by itself, without any memory
+  int64_t adapted;           // every ball has the extent of distributions that suits it
   int64_t numerator, level;  // the piece to cover
   int64_t until;             // level at which open pieces are handed back; -1: none are
 };
@@ -126,7 +127,8 @@ class BallCover {
   Homogeneous start;
   std::vector<Halves> halves;  // of the piece examined last on each level
   Ball ball;
-  std::vector<double> radius, images;
+  std::vector<Radius> radius;
+  std::vector<double> images;
   std::vector<int64_t> radius_piece;  // number of the piece that a radius belongs to
   std::vector<Open> live, stack;
   bool given_up = false;
@@ -201,11 +203,12 @@ class BallCover {
         Open pair = stack.back();
         stack.pop_back();
         if (spent()) return false;
-        double uncertain = radius_of(pair.moving) * metric.rate[pair.moving] * UP;
+        Rate rate(radius_of(pair.moving), metric.far[pair.moving], request.adapted != 0);
+        double uncertain = rate.uncertain;
         if (!request.plain && clusters_apart(axes, pair, uncertain)) continue;
         int64_t m = leaf_of(moving, pair.moving), f = leaf_of(fixed, pair.fixed);
         if (m >= 0 && f >= 0) {
-          if (faces_apart(pair, m, f, leaf.contact)) continue;
+          if (faces_apart(rate, m, f, leaf.contact)) continue;
           if (deep || uncertain < request.epsilon) {
             leaf.status = BALL_SUSPECT;
             leaf.reason = uncertain < request.epsilon ? BY_EPSILON : BY_RECURSION;
@@ -223,7 +226,7 @@ class BallCover {
     return true;
   }
 
-  double radius_of(int64_t node) {
+  const Radius& radius_of(int64_t node) {
     int64_t which = metric.of[node];
     if (radius_piece[which] != counts.pieces) {
       radius_piece[which] = counts.pieces;
@@ -257,7 +260,7 @@ class BallCover {
     return std::sqrt(product(half, half));
   }
 
-  bool faces_apart(const Open& pair, int64_t m, int64_t f, Contact& contact) {
+  bool faces_apart(const Rate& rate, int64_t m, int64_t f, Contact& contact) {
     counts.polygon_tests++;
     tests_of[m]++;
     Face at = face_of(moving, m), against = face_of(fixed, f);
@@ -265,8 +268,7 @@ class BallCover {
     for (int64_t i = 0; i < at.corners; i++) ball.image(at.corner + 3 * i, &images[3 * i]);
     at.corner = images.data();
     at.turned = metric.turned + 3 * moving.corner_first[m];
-    Fatness fat(radius_of(pair.moving), metric.rate[pair.moving], thickness);
-    return FatPolygon(at, against, fat, between).apart(contact);
+    return FatPolygon(at, against, fatness(rate, thickness), between).apart(contact);
   }
 
   // Corners within a face become the polyhedron's vertices.

@@ -56,18 +56,14 @@ inline Face face_of(const Surface& surface, int64_t face) {
           surface.triangle_first[face + 1] - triangle};
 }
 
-// The radius of a ball and a thickness as the tests take them: lambda and c of `quadratic`.
-struct Fatness {
-  double lambda, c;
-
-  // Best where rho is `rate`; k is kept where (1 + 1/k) r^2 is r^2 as good as exactly.
-  Fatness(double radius, double rate, double thickness) {
-    double a = radius * rate;
-    double k = a * 0x1p40 > thickness ? thickness / a : 0x1p40;
-    lambda = (1.0 + k) * radius * radius * UP;
-    c = k > 0.0 ? (1.0 + 1.0 / k) * thickness * thickness * UP : 0.0;
-  }
-};
+// How the tests take a ball and a thickness: k of `quadratic` best where rho is largest, and kept
+// where (1 + 1/k) r^2 is r^2 as good as exactly.
+inline Fatness fatness(const Rate& rate, double thickness) {
+  double k = 0x1p40;
+  if (rate.uncertain * k > thickness) k = thickness / rate.uncertain;
+  double c = k > 0.0 ? (1.0 + 1.0 / k) * thickness * thickness * UP : 0.0;
+  return {(1.0 + k) * rate.radius * rate.radius * UP, rate.spread * UP, c};
+}
 
 class FatPolygon {
  public:
@@ -92,7 +88,7 @@ class FatPolygon {
 
   // Bound a pair of features; remember the direction between them if they are the nearest so far.
   bool longer_than_fat(const Plane& z, const Plane& q, Domain domain, Parameters& where) {
-    Quadratic f = longer(z, q, fat.lambda, fat.c);
+    Quadratic f = longer(z, q, fat);
     if (!(lower_bound(f, domain, where) > 0.0)) return false;
     double at[3];
     for (int r = 0; r < 3; r++) at[r] = z.at[r] + where.s * z.s[r] + where.t * z.t[r];
@@ -209,7 +205,7 @@ class FatPolygon {
   bool parted(const Plane& z, Domain domain, const int64_t* m, int64_t m_count, const int64_t* f,
               int64_t f_count) const {
     Parameters where{0.0, 0.0};
-    lower_bound(longer(z, Plane{}, 0.0, 0.0), domain, where);
+    lower_bound(longer(z, Plane{}, {0.0, 0.0, 0.0}), domain, where);
     double n[3];
     for (int r = 0; r < 3; r++) n[r] = z.at[r] + where.s * z.s[r] + where.t * z.t[r];
     return plane_between(n, m, m_count, f, f_count);

@@ -3,21 +3,21 @@
 // The three basic tests of [Schroecker & Weber 2014, sec. 4] are one inequality. Let z(s, t) be the
 // difference of a point of the fixed feature and the image g(x) of a point of the moving one, both
 // affine in their parameters, and q(s, t) the point x in the coordinates in which its distortion
-// rate is rho^2 = 1 + |q|^2. The features keep the distance r for every displacement of the ball
+// rate is rho^2 = 1 + e |q|^2. The features keep the distance r for every displacement of the ball
 // B_R(g) iff |z| > R rho + r everywhere. For every k > 0
 //
 //     (a + r)^2 <= (1 + k) a^2 + (1 + 1/k) r^2        (the difference is (k a - r)^2 / k >= 0),
 //
 // so with lambda >= (1 + k) R^2 and c >= (1 + 1/k) r^2 it is enough that
 //
-//     f(s, t) = |z|^2 - lambda (1 + |q|^2) - c > 0
+//     f(s, t) = |z|^2 - lambda (1 + e |q|^2) - c > 0
 //
 // on the domain. Where f is concave along some direction its least value is on the boundary: there
 // the fat feature is no hyperboloid any more, and all cases of Remark 1 are covered.
 //
-// **Rounding.** `size` is at least 3 (|z0|^2 + |a|^2 + |b|^2) + lambda (1 + 3 (|q0|^2 + ...)) + c,
+// **Rounding.** `size` is 3 (|z0|^2 + |a|^2 + |b|^2) + lambda (1 + 3 e (|q0|^2 + ...)) + c,
 // which bounds f, its gradient and its coefficients on the domain. Differences of points round by u
-// of their length, a scalar product by 3 u of the lengths, lambda times it and two sums by 3 u: all
+// of their length, a scalar product by 3 u of the lengths, lambda e times it and two sums by 4 u: all
 // six coefficients together move f by less than 24 u size, and f of rounded coefficients is what is
 // bounded from here on. A tangent plane or a vertex of a parabola is at most 40 roundings of
 // numbers below `size`. A Hessian that passes for positive semidefinite lacks at most d <= 9 u tt
@@ -60,18 +60,24 @@ inline double product(const double* a, const double* b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-// |z|^2 - lambda (1 + |q|^2) - c.
-inline Quadratic longer(const Plane& z, const Plane& q, double lambda, double c) {
+// How fat the moving feature is: lambda, e and c of f.
+struct Fatness {
+  double lambda, spread, c;
+};
+
+// |z|^2 - lambda (1 + e |q|^2) - c.
+inline Quadratic longer(const Plane& z, const Plane& q, const Fatness& fat) {
+  double lambda = fat.lambda, each = fat.lambda * fat.spread;
   double zz = product(z.at, z.at), qq = product(q.at, q.at);
   double aa = product(z.s, z.s), bb = product(z.t, z.t);
   double ss = product(q.s, q.s), tt = product(q.t, q.t);
-  return {aa - lambda * ss,
-          product(z.s, z.t) - lambda * product(q.s, q.t),
-          bb - lambda * tt,
-          product(z.at, z.s) - lambda * product(q.at, q.s),
-          product(z.at, z.t) - lambda * product(q.at, q.t),
-          zz - lambda * (1.0 + qq) - c,
-          3.0 * (zz + aa + bb) + lambda * (1.0 + 3.0 * (qq + ss + tt)) + c};
+  return {aa - each * ss,
+          product(z.s, z.t) - each * product(q.s, q.t),
+          bb - each * tt,
+          product(z.at, z.s) - each * product(q.at, q.s),
+          product(z.at, z.t) - each * product(q.at, q.t),
+          zz - (lambda + each * qq) - fat.c,
+          3.0 * (zz + aa + bb) + lambda + 3.0 * each * (qq + ss + tt) + fat.c};
 }
 
 inline double value(const Quadratic& f, Parameters p) {

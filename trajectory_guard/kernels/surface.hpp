@@ -36,12 +36,15 @@ enum { FRAME_CENTRE = 0, FRAME_AXES = 3, FRAME_SIZE = 12 };
 // difference D = [C | t] of displacements, so that by Cauchy and Schwarz |D x| <= |D| rho with
 // |D|^2 = |C b + t|^2 + ||C K||_F^2, which is the metric of [Schroecker & Weber 2014, sec. 2].
 // q need not be exact: `residual` bounds |x - b - K q|, and |C| residual is added to the thickness.
+//
+// With K, sigma K is as good, and q / sigma: a distribution of sigma times the extent. So every
+// ball may choose its own (`Rate`).
 struct Metric {
   int64_t count;
   const double* frame;   // (count, 12) b, and K by rows [m]
   const double* span;    // (count,) at least |b| + ||K||_F [m]
   const int64_t* of;     // (nodes,) the distribution of each node of the tree
-  const double* rate;    // (nodes,) at least rho everywhere in the node's box or face
+  const double* far;     // (nodes,) at least |q| everywhere in the node's box or face
   const double* turned;  // (corners, 3) q of each corner in the distribution of its face
   double residual;       // [m]
 };

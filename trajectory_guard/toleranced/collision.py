@@ -17,7 +17,7 @@ import numpy as np
 
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.kernels import ball
-from trajectory_guard.kernels.ball import Curve, Limits, Metric, Surface
+from trajectory_guard.kernels.ball import Curve, Limits, Packed
 from trajectory_guard.polyhedron import Polyhedron
 from trajectory_guard.toleranced.containment import surely_apart
 from trajectory_guard.toleranced.curve import curve_of, errors_of, Motion
@@ -116,14 +116,12 @@ class Pair:
 
     :param moving: in its own frame.
     :param fixed: in the frame of the motions' images.
-    :param surfaces: both as the kernels take them.
-    :param metric: of the moving one.
+    :param packed: both as the kernels take them, and the metric of the moving one.
     """
 
     moving: Polyhedron
     fixed: Polyhedron
-    surfaces: tuple[Surface, Surface]
-    metric: Metric
+    packed: Packed
 
 
 def pair_of(
@@ -153,9 +151,9 @@ def pair_of(
         if G.shape != (4, 4) or not np.isfinite(G).all() or not G[3, 3] > 0.0:
             raise _invalid(f'moments must be (4, 4), finite, of positive mass, got {G.tolist()}')
         whole = given_moments(G)
-    packed = surface(moving)
-    metric = node_metric(packed, individual, whole)
-    return Pair(moving, fixed, (packed, surface(fixed)), metric)
+    own = surface(moving)
+    metric = node_metric(own, individual, whole)
+    return Pair(moving, fixed, Packed(own, surface(fixed), metric))
 
 
 def collide(
@@ -168,6 +166,7 @@ def collide(
     individual: bool = True,
     moments: np.ndarray | None = None,
     hierarchy: bool = True,
+    adapted: bool = True,
     max_depth: int = 32,
     max_tests: int = 100_000_000,
     threads: int = 1,
@@ -180,6 +179,7 @@ def collide(
         epsilon=epsilon,
         clearance=clearance,
         hierarchy=hierarchy,
+        adapted=adapted,
         max_depth=max_depth,
         max_tests=max_tests,
         threads=threads,
@@ -194,6 +194,7 @@ def collisions(
     epsilon: float,
     clearance: float = 0.0,
     hierarchy: bool = True,
+    adapted: bool = True,
     max_depth: int = 32,
     max_tests: int = 100_000_000,
     threads: int = 1,
@@ -209,6 +210,8 @@ def collisions(
     :param clearance: distance that must be exceeded [m].
     :param hierarchy: search by trees over the faces; or every pair of faces by itself, as the
         paper's Listing 1 does.
+    :param adapted: scale each distribution about its barycentre as suits the ball at hand; or take
+        it as it is, as the paper does.
     :param max_depth: halvings of the motion, 0 to 48.
     :param max_tests: tests before what is left is given up as suspect.
     :param threads: to share the hierarchical search; the answer does not depend on it.
@@ -232,10 +235,9 @@ def collisions(
     if max_depth > DEEPEST:
         raise _invalid(f'max_depth must be <= {DEEPEST}, got {max_depth}')
     flag = np.zeros(1, np.int64) if stop is None else stop
-    limits = Limits(
-        clearance, *errors_of(motion), epsilon, max_depth, max_tests, plain=not hierarchy
-    )
-    ask = partial(ball.cover, *pair.surfaces, pair.metric, curve, stop=flag)
+    errors = errors_of(motion)
+    limits = Limits(clearance, *errors, epsilon, max_depth, max_tests, not hierarchy, adapted)
+    ask = partial(ball.cover, pair.packed, curve, stop=flag)
     done = list(_shared(ask, limits, threads)) if hierarchy else [ask(limits)]
     return _answer(pair, curve, done)
 
@@ -281,11 +283,10 @@ def _answer(pair: Pair, curve: Curve, done: list[ball.Covered]) -> Collisions:
         else:
             kept.append((start, end))
     suspects.sort(key=lambda s: (s.start, s.end, s.moving_face, s.fixed_face))
-    moving, fixed = pair.surfaces
     return Collisions(
         tuple(kept),
         tuple(suspects),
-        (len(moving.corner_first) - 1) * (len(fixed.corner_first) - 1),
+        pair.packed.moving_faces * pair.packed.fixed_faces,
         sum(covered.counts.polygon_tests for covered in done),
         sum(covered.counts.node_tests for covered in done),
         sum(covered.counts.pieces for covered in done),

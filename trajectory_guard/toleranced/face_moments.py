@@ -1,5 +1,5 @@
 """
-Mass distributions of faces, of clusters of faces, and of a whole surface.
+Mass distributions of faces and of a whole surface.
 
 A distribution of mass 1 is its barycentre b and its central inertia J = sum w_i (m_i - b)
 (m_i - b)^T; the metric of [Schroecker & Weber 2014, sec. 2] needs no more, and every positive
@@ -71,17 +71,6 @@ def surface_moments(surface: Surface) -> Moments:
     to = b - barycentre
     total = np.einsum('f,fij->ij', share, inertia + to[:, :, None] * to[:, None, :])
     return Moments(barycentre[None], total[None])
-
-
-def box_moments(box: np.ndarray) -> Moments:
-    """
-    Return equal masses at the corners of boxes.
-
-    Of all distributions on a box these have the least largest distortion rate, 2 at each corner.
-
-    :param box: (M, 6) centres and half sides [m].
-    """
-    return Moments(box[:, :3].copy(), box[:, 3:, None] ** 2 * np.eye(3))
 
 
 def given_moments(G: np.ndarray) -> Moments:

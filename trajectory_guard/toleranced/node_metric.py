@@ -5,7 +5,6 @@ import numpy as np
 from trajectory_guard.body import U
 from trajectory_guard.kernels.ball import Metric, Surface
 from trajectory_guard.toleranced.face_moments import (
-    box_moments,
     face_moments,
     Moments,
     surface_moments,
@@ -26,7 +25,7 @@ def node_metric(surface: Surface, individual: bool, whole: Moments | None = None
     K is a proposal, as b is; q is what a solver made of it, and only the residual x - b - K q is
     bounded.  In floating point that is three products and five sums of numbers below
     |x| + |b| + |K| |q|: within 16 u of them.  A point of a box or of a face is a mean of corners,
-    so its q is the same mean of theirs: rho is convex and largest at a corner, and the residual
+    so its q is the same mean of theirs: |q| is convex and largest at a corner, and the residual
     is no larger than the largest.
 
     :param surface: of the moving polyhedron.
@@ -37,33 +36,44 @@ def node_metric(surface: Surface, individual: bool, whole: Moments | None = None
     face = surface.branch[:, 2]
     leaves = np.flatnonzero(face >= 0)
     if individual:
-        moments = box_moments(surface.box)
+        b, K = _box_frames(surface.box)
         own = face_moments(surface)
-        for all_nodes, of_faces in zip(moments, own, strict=True):
-            all_nodes[leaves] = of_faces[face[leaves]]
+        b[leaves] = own.barycentre[face[leaves]]
+        K[leaves] = _factor(own.inertia)[face[leaves]]
         of = np.arange(nodes)
     else:
-        moments = surface_moments(surface) if whole is None else whole
+        b, inertia = surface_moments(surface) if whole is None else whole
+        K = _factor(inertia)
         of = np.zeros(nodes, np.int64)
-    K = _factor(moments.inertia)
-    b = moments.barycentre
     node_of_face = np.empty(len(leaves), np.int64)
     node_of_face[face[leaves]] = leaves
     node = np.repeat(node_of_face, np.diff(surface.corner_first))
     turned, residual = _turned(surface.corner, b[of[node]], K[of[node]])
     box = surface.box[:, None, :3] + surface.box[:, None, 3:] * _CORNERS
     at_box, box_residual = _turned(box, b[of][:, None], K[of][:, None])
-    rate = _rate(at_box).max(axis=1)
-    rate[node_of_face] = np.maximum.reduceat(_rate(turned), surface.corner_first[:-1])
+    far = _length(at_box).max(axis=1)
+    far[node_of_face] = np.maximum.reduceat(_length(turned), surface.corner_first[:-1])
     span = np.linalg.norm(b, axis=1) + np.linalg.norm(K, axis=(1, 2))
     return Metric(
         np.ascontiguousarray(np.hstack([b, K.reshape(-1, 9)])),
         span * (1.0 + 16.0 * U),
         np.ascontiguousarray(of),
-        rate,
+        far,
         turned,
         float(np.maximum(residual, box_residual)),
     )
+
+
+def _box_frames(box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """
+    Return b and K of equal masses at the corners of each box.
+
+    Of all distributions on a box these have the least largest distortion rate, 2 at each corner.
+    """
+    half = box[:, 3:]
+    size = np.linalg.norm(half, axis=1, keepdims=True)
+    half = np.maximum(half, THINNEST * np.where(size > 0.0, size, 1.0))
+    return box[:, :3].copy(), half[:, :, None] * np.eye(3)
 
 
 def _factor(inertia: np.ndarray) -> np.ndarray:
@@ -88,6 +98,6 @@ def _turned(x: np.ndarray, b: np.ndarray, K: np.ndarray) -> tuple[np.ndarray, fl
     return np.ascontiguousarray(q[..., 0]), float((missing + 16.0 * U * size).max())
 
 
-def _rate(q: np.ndarray) -> np.ndarray:
-    """Return the distortion rate, rounded upward."""
-    return np.sqrt(1.0 + np.einsum('...i,...i->...', q, q)) * (1.0 + 8.0 * U)
+def _length(q: np.ndarray) -> np.ndarray:
+    """Return |q|, rounded upward."""
+    return np.linalg.norm(q, axis=-1) * (1.0 + 8.0 * U)
