@@ -69,12 +69,17 @@ def random_planes(rng, kind):
         z[2] = z[1] * rng.choice([-1.0, 1.0, 0.5]) + rng.choice([0.0, 1e-9]) * z[2]
     elif kind == 'flat':
         z[:, 2] = 0.0
-    q[rng.integers(1, 3)] = 0.0
+    if kind == 'saddle':
+        # Convex along both parameters, not between them.
+        z[2] = z[1] + 0.1 * z[2]
+        q[2] = -q[1]
+    else:
+        q[rng.integers(1, 3)] = 0.0
     return z, q
 
 
 @pytest.mark.parametrize('triangle', [False, True])
-@pytest.mark.parametrize('kind', ['any', 'touching', 'parallel', 'flat'])
+@pytest.mark.parametrize('kind', ['any', 'touching', 'parallel', 'flat', 'saddle'])
 @pytest.mark.parametrize('scale', SCALES)
 def test_lower_bound_is_one_and_is_tight(kind, triangle, scale):
     rng = np.random.default_rng(7)
@@ -200,6 +205,22 @@ def test_distortion_rate_bounds_every_displacement():
                 moved = np.linalg.norm(x @ D[:, :3].T + D[:, 3], axis=1)
                 assert (moved <= length * np.hypot(1.0, metric.far[node]) * (1 + 1e-9)).all()
         assert metric.residual < 1e-12
+
+
+def test_ball_round_a_curve_that_stands():
+    """One control point, and what rounding makes of it is in the radius."""
+    rng = np.random.default_rng(17)
+    for _ in range(100):
+        point = np.column_stack([np.linalg.qr(rng.normal(size=(3, 3)))[0], rng.normal(size=3)])
+        curve = Curve(point.reshape(1, 12), rng.uniform(0.5, 2.0, 1))
+        triangle = surface(one_face(rng.normal(size=(3, 3))))
+        metric = node_metric(triangle, True)
+        radius, _, centre = ball_calls.radius(metric, curve)
+        frame = exact(metric.frame[0])
+        D = exact(point) - exact(centre)
+        moved, turned = D[:, :3] @ frame[:3] + D[:, 3], D[:, :3] @ frame[3:].reshape(3, 3)
+        assert Fraction(radius) ** 2 >= moved @ moved + (turned * turned).sum()
+        assert radius < 1e-13
 
 
 @pytest.mark.parametrize('far', [0.0, 1.0, 2.0])
@@ -342,6 +363,21 @@ def test_one_unit_in_the_last_place(bits):
     lifted = one_face([[0.25, 0.25, 1.0 + height], [1, 0, 3], [0, 1, 3]])
     assert not listing_2(one_face(SQUARE), lifted, 0.0, thickness=1.0 + max(height, 0.0))[0]
     assert listing_2(one_face(SQUARE), lifted, 0.0, thickness=1.0 - 1e-9)[0]
+
+
+@pytest.mark.parametrize('radius', [0.0, 1e-9, 1e-3, 0.1, 0.3])
+@pytest.mark.parametrize('thickness', [1e-12, 1e-6, 1e-2, 0.3])
+def test_radius_and_thickness_add_up(radius, thickness):
+    """A corner above a face is apart from it beyond R rho + r, and not before."""
+    up = one_face([[0, 0, 0], [1, 0, 3], [0, 1, 3]])
+    rate = np.sqrt(1.0 + (node_metric(surface(up), True).turned[0] ** 2).sum())
+    need = radius * rate + thickness
+    for factor, apart in ((1.0 - 1e-9, False), (1.3, True)):
+        plate = one_face(
+            [[-9, -9, -factor * need], [9, -9, -factor * need], [0, 9, -factor * need]]
+        )
+        # Squares of lengths of 20 m resolve no gap below some micrometres.
+        assert listing_2(up, plate, radius, thickness)[0] == (apart and need > 1e-4)
 
 
 def test_large_radii_need_no_hyperboloids():

@@ -218,6 +218,24 @@ def test_touching_is_not_free(ulps):
     assert found.free == ()
 
 
+def test_rounding_of_images():
+    """A corner is computed to stand on a plate; where it is in it, exactly, nothing is free."""
+    rng = np.random.default_rng(23)
+    far = 1000.0
+    plate = Polyhedron(8.0 * grid(1).vertices + [0, 0, far], grid(1).faces)
+    met = 0
+    for _ in range(150):
+        # Its faces fill their boxes, so that planes decide, to the last bits.
+        moving = box(rng.uniform(0.1, 0.5, 3))
+        P = np.column_stack([np.linalg.qr(rng.normal(size=(3, 3)))[0], np.zeros(3)])
+        P[2, 3] = far - (moving.vertices @ P[2, :3]).min()
+        still = RationalCurve(np.tile(P, (3, 1, 1)), rng.uniform(0.5, 2.0, 3))
+        if in_contact(moving, plate, still, Fraction(1, 2)):
+            met += 1
+            assert collide(moving, plate, still, epsilon=1e-9, max_depth=2).free == ()
+    assert met > 30
+
+
 @pytest.mark.parametrize('scale', [1e-6, 1.0, 1e6])
 def test_clearance(scale):
     """A gap that is constant is free for all clearances below it, and for none that is not."""
