@@ -17,14 +17,17 @@ def surely_outside(points: np.ndarray, vertices: np.ndarray, triangles: np.ndarr
     |a||b||c| + (a . b)|c| + (b . c)|a| + (c . a)|b|) [Van Oosterom & Strackee 1983]; over a closed
     surface they add up to 4 pi times the winding number, an integer.  Errors of the components
     of at most e turn the pair (y, x) by at most asin(e / |(y, x)|) < 2 e / |(y, x)|, as long as
-    that is below 1; the sum of all these bounds must leave no other integer than 0.
+    that is below 1; the sum of all these bounds must leave no other integer than 0.  Outside the
+    box around the surface it is 0.
 
     :param points: (n, 3) [m].
     :param vertices: (V, 3) of the surface [m].
     :param triangles: (T, 3).
     :returns: False for a point inside, and where rounding leaves a doubt (on the surface).
     """
-    return all(_winds_not(vertices[triangles] - point) for point in points)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    near = points[((points >= low) & (points <= high)).all(axis=1)]
+    return all(_winds_not(vertices[triangles] - point) for point in near)
 
 
 def _winds_not(corners: np.ndarray) -> bool:

@@ -27,7 +27,8 @@ int guard_ball_cover(const Surface* moving, const Surface* fixed, const Metric* 
                      BallAnswer* answer) try {
   static thread_local std::vector<BallLeaf> leaves;
   static thread_local std::vector<Open> handed;
-  BallCover cover(*moving, *fixed, *metric, *curve, *request, stop, tests_of);
+  static thread_local BallWork work;
+  BallCover cover(*moving, *fixed, *metric, *curve, *request, stop, tests_of, work);
   cover.run(pairs, count);
   leaves.swap(cover.leaves);
   handed.swap(cover.handed);

@@ -69,6 +69,14 @@ struct Counts {
   int64_t pieces, node_tests, polygon_tests, depth;
 };
 
+// Radii by distribution, kept by a thread from one request to the next: which piece of all that the
+// thread ever examined they belong to tells whether they are of use.
+struct BallWork {
+  std::vector<Radius> radius;
+  std::vector<int64_t> radius_piece;
+  int64_t piece = 0;
+};
+
 class BallCover {
  public:
   std::vector<BallLeaf> leaves;
@@ -76,16 +84,20 @@ class BallCover {
   Counts counts{};
 
   BallCover(const Surface& moving, const Surface& fixed, const Metric& metric, const Curve& curve,
-            const BallRequest& request, const int64_t* stop, int64_t* tests_of)
+            const BallRequest& request, const int64_t* stop, int64_t* tests_of, BallWork& work)
       : moving(moving),
         fixed(fixed),
         metric(metric),
         request(request),
         stop(stop),
         tests_of(tests_of),
-        halves(DEEPEST_PIECE + 1),
-        radius(metric.count),
-        radius_piece(metric.count, -1) {
+        work(work),
+        halves(DEEPEST_PIECE + 1) {
+    if (int64_t(work.radius.size()) < metric.count) {
+      // In this order, so that no failure leaves less of the second than of the first.
+      work.radius_piece.resize(metric.count, -1);
+      work.radius.resize(metric.count);
+    }
     ball.size = size_of(curve);
     double images = 3.0 * ball.size.linear * moving.reach + 2.0 * ball.size.shift;
     double unit = UNIT_ROUNDOFF * (images + fixed.reach);
@@ -123,15 +135,15 @@ class BallCover {
   const BallRequest& request;
   const int64_t* stop;
   int64_t* tests_of;
+  BallWork& work;
   double thickness, between;
   Homogeneous start;
   std::vector<Halves> halves;  // of the piece examined last on each level
   Ball ball;
-  std::vector<Radius> radius;
   std::vector<double> images;
-  std::vector<int64_t> radius_piece;  // number of the piece that a radius belongs to
   std::vector<Open> live, stack;
   bool given_up = false;
+  bool crossing = false;  // the last faces that were not apart
   int64_t given_up_by = BY_TESTS;
 
   static int64_t leaf_of(const Surface& surface, int64_t node) {
@@ -192,11 +204,13 @@ class BallCover {
   bool examine(const Homogeneous& piece, Halves& halved, int64_t level, int64_t first, int64_t last,
                BallLeaf& leaf) {
     counts.pieces++;
+    work.piece++;
     if (level > counts.depth) counts.depth = level;
     halve(piece, halved);
     ball.enclose(piece, halved.left);
     Axes axes(ball.centre);
     bool deep = level >= request.max_depth || level >= DEEPEST_PIECE;
+    size_t open = live.size();
     for (int64_t i = first; i < last; i++) {
       stack.assign(1, live[i]);
       while (!stack.empty()) {
@@ -218,6 +232,10 @@ class BallCover {
             return false;
           }
           live.push_back(pair);
+          if (crossing && !request.plain) {
+            leave(open, i + 1, last);
+            return true;
+          }
         } else if (!split(pair, uncertain, deep || uncertain < request.epsilon)) {
           live.push_back(pair);
         }
@@ -226,13 +244,24 @@ class BallCover {
     return true;
   }
 
+  // Leave the pairs that were not looked at for the halves: the faces of the last survivor seem to
+  // cross in the middle, where the halves meet, so it comes first, and the rest can wait.
+  void leave(size_t open, int64_t next, int64_t last) {
+    std::swap(live[open], live.back());
+    live.insert(live.end(), stack.begin(), stack.end());
+    for (; next < last; next++) {
+      Open pair = live[next];
+      live.push_back(pair);
+    }
+  }
+
   const Radius& radius_of(int64_t node) {
     int64_t which = metric.of[node];
-    if (radius_piece[which] != counts.pieces) {
-      radius_piece[which] = counts.pieces;
-      radius[which] = ball.radius(metric, which);
+    if (work.radius_piece[which] != work.piece) {
+      work.radius_piece[which] = work.piece;
+      work.radius[which] = ball.radius(metric, which);
     }
-    return radius[which];
+    return work.radius[which];
   }
 
   bool clusters_apart(const Axes& axes, const Open& pair, double uncertain) {
@@ -268,7 +297,10 @@ class BallCover {
     for (int64_t i = 0; i < at.corners; i++) ball.image(at.corner + 3 * i, &images[3 * i]);
     at.corner = images.data();
     at.turned = metric.turned + 3 * moving.corner_first[m];
-    return FatPolygon(at, against, fatness(rate, thickness), between).apart(contact);
+    FatPolygon polygon(at, against, fatness(rate, thickness), between);
+    if (polygon.apart(contact)) return true;
+    crossing = polygon.cross();
+    return false;
   }
 
   // Corners within a face become the polyhedron's vertices.

@@ -76,6 +76,17 @@ class FatPolygon {
     return vertices(contact) && edges(contact) && faces(contact) && disjoint(contact);
   }
 
+  // Guess whether the polygons cross where they stand (untrusted: no margin).
+  bool cross() const {
+    for (int64_t i = 0; i < moving.edges; i++)
+      for (int64_t j = 0; j < fixed.triangles; j++)
+        if (pierces(moving, moving.edge + 2 * i, fixed, fixed.triangle + 3 * j)) return true;
+    for (int64_t i = 0; i < fixed.edges; i++)
+      for (int64_t j = 0; j < moving.triangles; j++)
+        if (pierces(fixed, fixed.edge + 2 * i, moving, moving.triangle + 3 * j)) return true;
+    return false;
+  }
+
  private:
   const Face &moving, &fixed;
   Fatness fat;
@@ -256,6 +267,25 @@ class FatPolygon {
         return false;
       }
     return true;
+  }
+
+  static bool pierces(const Face& one, const int64_t* edge, const Face& other,
+                      const int64_t* triangle) {
+    double a[3][3], along[3], volume[3];
+    const double *p = one.corner + 3 * edge[0], *q = one.corner + 3 * edge[1];
+    for (int i = 0; i < 3; i++) subtract(other.corner + 3 * triangle[i], p, a[i]);
+    subtract(q, p, along);
+    for (int i = 0; i < 3; i++) volume[i] = determinant(along, a[i], a[(i + 1) % 3]);
+    bool through = volume[0] * volume[1] > 0.0 && volume[1] * volume[2] > 0.0;
+    if (!through) return false;
+    // Of p, and what q adds.
+    double at_p = determinant(a[0], a[1], a[2]), change = volume[0] + volume[1] + volume[2];
+    return at_p * (at_p - change) < 0.0;
+  }
+
+  static double determinant(const double* a, const double* b, const double* c) {
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+           a[2] * (b[0] * c[1] - b[1] * c[0]);
   }
 
   static void middle(const Face& face, const int64_t* edge, double* place) {

@@ -19,7 +19,7 @@ from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.kernels import ball
 from trajectory_guard.kernels.ball import Curve, Limits, Packed
 from trajectory_guard.polyhedron import Polyhedron
-from trajectory_guard.toleranced.containment import surely_apart
+from trajectory_guard.toleranced.containment import Solid, solid, surely_apart
 from trajectory_guard.toleranced.curve import curve_of, errors_of, Motion
 from trajectory_guard.toleranced.face_moments import given_moments
 from trajectory_guard.toleranced.node_metric import node_metric
@@ -117,11 +117,13 @@ class Pair:
     :param moving: in its own frame.
     :param fixed: in the frame of the motions' images.
     :param packed: both as the kernels take them, and the metric of the moving one.
+    :param solids: both, if they are watertight.
     """
 
     moving: Polyhedron
     fixed: Polyhedron
     packed: Packed
+    solids: tuple[Solid, Solid] | None
 
 
 def pair_of(
@@ -153,7 +155,9 @@ def pair_of(
         whole = given_moments(G)
     own = surface(moving)
     metric = node_metric(own, individual, whole)
-    return Pair(moving, fixed, Packed(own, surface(fixed), metric))
+    closed = moving.watertight and fixed.watertight
+    solids = (solid(moving), solid(fixed)) if closed else None
+    return Pair(moving, fixed, Packed(own, surface(fixed), metric), solids)
 
 
 def collide(
@@ -274,10 +278,9 @@ def _answer(pair: Pair, curve: Curve, done: list[ball.Covered]) -> Collisions:
     leaves = np.concatenate([covered.leaves for covered in done])
     suspects = [_suspect(leaf) for leaf in leaves[leaves['status'] == ball.SUSPECT]]
     free = _complement(suspects)
-    solids = pair.moving.watertight and pair.fixed.watertight
     kept = []
     for start, end in free:
-        if solids and not surely_apart(pair.moving, pair.fixed, curve, 0.5 * (start + end)):
+        if pair.solids and not surely_apart(*pair.solids, curve, 0.5 * (start + end)):
             named = (Why.CONTAINED, Kind.CONTAINED, -1, -1, (), (), None)
             suspects.append(Suspect(start, end, *named))
         else:
@@ -291,7 +294,7 @@ def _answer(pair: Pair, curve: Curve, done: list[ball.Covered]) -> Collisions:
         sum(covered.counts.node_tests for covered in done),
         sum(covered.counts.pieces for covered in done),
         max(covered.counts.depth for covered in done),
-        np.sum([covered.tests_of for covered in done], axis=0),
+        np.add.reduce([covered.tests_of for covered in done]),
     )
 
 

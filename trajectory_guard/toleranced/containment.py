@@ -1,5 +1,7 @@
 """Whether one of two solids with disjoint surfaces lies inside the other, at an instant."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -9,9 +11,33 @@ from trajectory_guard.polyhedron import Polyhedron
 from trajectory_guard.winding import surely_outside
 
 
-def surely_apart(moving: Polyhedron, fixed: Polyhedron, curve: Curve, instant: float) -> bool:
+@dataclass(frozen=True, slots=True, eq=False)
+class Solid:
     """
-    Say whether neither of two watertight polyhedra has a part inside the other.
+    A watertight polyhedron, and a vertex of each connected part of its surface.
+
+    :param polyhedron: the solid.
+    :param part: (P,) indices of vertices.
+    """
+
+    polyhedron: Polyhedron
+    part: np.ndarray
+
+
+def solid(polyhedron: Polyhedron) -> Solid:
+    """Return a watertight polyhedron with its parts."""
+    count = len(polyhedron.vertices)
+    start, end = polyhedron.edges.T
+    joined = coo_array((np.ones(len(start)), (start, end)), shape=(count, count))
+    _, part = connected_components(joined, directed=False)
+    used = np.unique(polyhedron.edges)
+    _, first = np.unique(part[used], return_index=True)
+    return Solid(polyhedron, used[first])
+
+
+def surely_apart(moving: Solid, fixed: Solid, curve: Curve, instant: float) -> bool:
+    """
+    Say whether neither of two solids has a part inside the other.
 
     Their surfaces are known to keep apart by more than the rounding of a pose, so each part of a
     surface is inside as a whole or not at all, and one vertex of it tells.
@@ -23,10 +49,11 @@ def surely_apart(moving: Polyhedron, fixed: Polyhedron, curve: Curve, instant: f
     :returns: False where one is inside, and in doubt.
     """
     pose = pose_at(curve, instant)
-    images = moving.vertices @ pose[:, :3].T + pose[:, 3]
+    images = moving.polyhedron.vertices @ pose[:, :3].T + pose[:, 3]
+    still = fixed.polyhedron.vertices
     return surely_outside(
-        images[_one_of_each_part(moving)], fixed.vertices, fixed.triangles
-    ) and surely_outside(fixed.vertices[_one_of_each_part(fixed)], images, moving.triangles)
+        images[moving.part], still, fixed.polyhedron.triangles
+    ) and surely_outside(still[fixed.part], images, moving.polyhedron.triangles)
 
 
 def pose_at(curve: Curve, instant: float) -> np.ndarray:
@@ -40,14 +67,3 @@ def pose_at(curve: Curve, instant: float) -> np.ndarray:
     while len(rows) > 1:
         rows = (1.0 - instant) * rows[:-1] + instant * rows[1:]
     return (rows[0, :12] / rows[0, 12]).reshape(3, 4)
-
-
-def _one_of_each_part(polyhedron: Polyhedron) -> np.ndarray:
-    """Return a vertex of each connected part of the surface."""
-    count = len(polyhedron.vertices)
-    start, end = polyhedron.edges.T
-    joined = coo_array((np.ones(len(start)), (start, end)), shape=(count, count))
-    _, part = connected_components(joined, directed=False)
-    used = np.unique(polyhedron.edges)
-    _, first = np.unique(part[used], return_index=True)
-    return used[first]
