@@ -9,7 +9,9 @@ from rational_curves import random_curve, rational_curve, RationalCurve
 
 from trajectory_guard.errors import RequestError
 from trajectory_guard.polyhedron import Polyhedron
-from trajectory_guard.toleranced.collision import collide, collisions, Kind, pair_of, Why
+from trajectory_guard.toleranced.collision import collide, collisions
+from trajectory_guard.toleranced.pair import pair_of
+from trajectory_guard.toleranced.suspect import Kind, Why
 
 STILL = [[1.0, 0.0, 0.0, 0.0]] * 5
 

@@ -26,7 +26,8 @@ def surely_outside(points: np.ndarray, vertices: np.ndarray, triangles: np.ndarr
     :returns: False for a point inside, and where rounding leaves a doubt (on the surface).
     """
     low, high = vertices.min(axis=0), vertices.max(axis=0)
-    near = points[((points >= low) & (points <= high)).all(axis=1)]
+    # Written so that a NaN is near.
+    near = points[~((points < low) | (points > high)).any(axis=1)]
     return all(_winds_not(vertices[triangles] - point) for point in near)
 
 

@@ -61,7 +61,7 @@ inline Face face_of(const Surface& surface, int64_t face) {
 inline Fatness fatness(const Rate& rate, double thickness) {
   double k = 0x1p40;
   if (rate.uncertain * k > thickness) k = thickness / rate.uncertain;
-  double c = k > 0.0 ? (1.0 + 1.0 / k) * thickness * thickness * UP : 0.0;
+  double c = k > 0.0 ? (1.0 + 1.0 / k) * thickness * thickness * UP : INFINITY;
   return {(1.0 + k) * rate.radius * rate.radius * UP, rate.spread * UP, c};
 }
 

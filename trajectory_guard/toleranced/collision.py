@@ -10,20 +10,18 @@ motion there is below epsilon, so some faces come within about that of each othe
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from enum import IntEnum
 from functools import partial
 
 import numpy as np
 
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.kernels import ball
-from trajectory_guard.kernels.ball import Curve, Limits, Packed
+from trajectory_guard.kernels.ball import Curve, Limits
 from trajectory_guard.polyhedron import Polyhedron
-from trajectory_guard.toleranced.containment import Solid, solid, surely_apart
+from trajectory_guard.toleranced.containment import surely_apart
 from trajectory_guard.toleranced.curve import curve_of, errors_of, Motion
-from trajectory_guard.toleranced.face_moments import given_moments
-from trajectory_guard.toleranced.node_metric import node_metric
-from trajectory_guard.toleranced.surface import surface
+from trajectory_guard.toleranced.pair import Pair, pair_of
+from trajectory_guard.toleranced.suspect import Kind, Suspect, suspect_of, Why
 
 # Halvings before the work is shared out: sixteen parts, whatever the number of threads, so that
 # the answer does not depend on it.
@@ -31,55 +29,6 @@ SHARED_LEVEL = 4
 
 # Times are exact in a double up to here.
 DEEPEST = 48
-
-
-class Kind(IntEnum):
-    """Which test left a place open; for the last two nothing is named."""
-
-    VERTEX_FACE = ball.VERTEX_FACE
-    EDGE_EDGE = ball.EDGE_EDGE
-    FACE_VERTEX = ball.FACE_VERTEX
-    EDGE_PIERCES = ball.EDGE_PIERCES
-    FACE_PIERCED = ball.FACE_PIERCED
-    CONTAINED = 5
-    UNKNOWN = 6
-
-
-class Why(IntEnum):
-    """Why an interval is suspect."""
-
-    EPSILON = ball.BY_EPSILON
-    DEPTH = ball.BY_RECURSION
-    BUDGET = ball.BY_TESTS
-    STOPPED = ball.BY_PATIENCE
-    CONTAINED = 4
-
-
-@dataclass(frozen=True, slots=True)
-class Suspect:
-    """
-    An interval that is not proved free, and one place where it may not be.
-
-    :param start: in [0, 1], exact.
-    :param end: in [0, 1], exact.
-    :param why: what ended the search.
-    :param kind: the test that is open: moving features first.
-    :param moving_face: index, -1 if none is named.
-    :param fixed_face: index, -1 if none is named.
-    :param moving: vertices of the moving feature; none for a face.
-    :param fixed: vertices of the fixed feature; none for a face.
-    :param place: about where, in the fixed polyhedron's frame [m].
-    """
-
-    start: float
-    end: float
-    why: Why
-    kind: Kind
-    moving_face: int
-    fixed_face: int
-    moving: tuple[int, ...]
-    fixed: tuple[int, ...]
-    place: tuple[float, float, float] | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,57 +56,6 @@ class Collisions:
     pieces: int
     depth: int
     tests_of: np.ndarray
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Pair:
-    """
-    Two polyhedra, prepared for any number of motions.
-
-    :param moving: in its own frame.
-    :param fixed: in the frame of the motions' images.
-    :param packed: both as the kernels take them, and the metric of the moving one.
-    :param solids: both, if they are watertight.
-    """
-
-    moving: Polyhedron
-    fixed: Polyhedron
-    packed: Packed
-    solids: tuple[Solid, Solid] | None
-
-
-def pair_of(
-    moving: Polyhedron,
-    fixed: Polyhedron,
-    *,
-    individual: bool = True,
-    moments: np.ndarray | None = None,
-) -> Pair:
-    """
-    Prepare two polyhedra.
-
-    :param moving: in its own frame.
-    :param fixed: in the frame of the motions' images.
-    :param individual: each moving face has its own mass distribution, equal masses at its corners
-        and over its barycentre; or all have the sum of these.
-    :param moments: (4, 4) matrix G = sum of w_i [m_i; 1] [m_i; 1]^T of the distribution for all
-        [m^2].
-    :raises RequestError: moments is not a finite (4, 4) matrix of positive mass, or given for
-        individual distributions.
-    """
-    whole = None
-    if moments is not None:
-        G = np.asarray(moments, dtype=np.float64)
-        if individual:
-            raise _invalid('moments are for one distribution, not for individual ones')
-        if G.shape != (4, 4) or not np.isfinite(G).all() or not G[3, 3] > 0.0:
-            raise _invalid(f'moments must be (4, 4), finite, of positive mass, got {G.tolist()}')
-        whole = given_moments(G)
-    own = surface(moving)
-    metric = node_metric(own, individual, whole)
-    closed = moving.watertight and fixed.watertight
-    solids = (solid(moving), solid(fixed)) if closed else None
-    return Pair(moving, fixed, Packed(own, surface(fixed), metric), solids)
 
 
 def collide(
@@ -276,7 +174,7 @@ def _shared(ask: partial[ball.Covered], limits: Limits, threads: int) -> Iterato
 
 def _answer(pair: Pair, curve: Curve, done: list[ball.Covered]) -> Collisions:
     leaves = np.concatenate([covered.leaves for covered in done])
-    suspects = [_suspect(leaf) for leaf in leaves[leaves['status'] == ball.SUSPECT]]
+    suspects = [suspect_of(leaf) for leaf in leaves[leaves['status'] == ball.SUSPECT]]
     free = _complement(suspects)
     kept = []
     for start, end in free:
@@ -295,24 +193,6 @@ def _answer(pair: Pair, curve: Curve, done: list[ball.Covered]) -> Collisions:
         sum(covered.counts.pieces for covered in done),
         max(covered.counts.depth for covered in done),
         np.add.reduce([covered.tests_of for covered in done]),
-    )
-
-
-def _suspect(leaf: np.void) -> Suspect:
-    width = 2.0 ** -int(leaf['level'])
-    kind = int(leaf['kind'])
-    named = kind != ball.NOTHING
-    x, y, z = leaf['place'].tolist()
-    return Suspect(
-        int(leaf['numerator']) * width,
-        (int(leaf['numerator']) + 1) * width,
-        Why(int(leaf['reason'])),
-        Kind(kind) if named else Kind.UNKNOWN,
-        int(leaf['moving_face']),
-        int(leaf['fixed_face']),
-        tuple(v for v in leaf['moving'].tolist() if v >= 0),
-        tuple(v for v in leaf['fixed'].tolist() if v >= 0),
-        (x, y, z) if named else None,
     )
 
 

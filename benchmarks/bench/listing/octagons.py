@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from bench.clock import best_ms
 from bench.listing.motions import octagon_motion
 from bench.listing.shapes import octagon
-from trajectory_guard.toleranced.collision import collisions, pair_of
+from trajectory_guard.toleranced.collision import collisions
+from trajectory_guard.toleranced.pair import pair_of
 
 EPSILON = 0.02  # one percent of the moving octagon's diameter
 

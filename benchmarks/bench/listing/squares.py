@@ -8,7 +8,8 @@ import numpy as np
 from bench.clock import best_ms
 from bench.listing.motions import Motion, square_motion
 from bench.listing.shapes import squares
-from trajectory_guard.toleranced.collision import collisions, Pair, pair_of
+from trajectory_guard.toleranced.collision import collisions
+from trajectory_guard.toleranced.pair import Pair, pair_of
 
 EPSILON = 0.01 * np.sqrt(2.0)  # one percent of the square's diameter
 SIZES = (*range(1, 11), 15, 20, 30, 50, 100)
