@@ -315,6 +315,20 @@ def test_non_convex_faces():
     assert not listing_2(below, one_face(notched), 0.0)[0]
 
 
+def test_corners_off_the_plane():
+    """A face is its triangles: where they meet, above its outline, there is a ridge."""
+    h = 4e-6
+    ridge = one_face([[-1, 0, h], [0, -1, -h], [1, 0, h], [0, 1, -h]])
+    assert {*map(frozenset, ridge.triangles.tolist())} == {
+        frozenset((0, 1, 2)),
+        frozenset((0, 2, 3)),
+    }
+    for height, apart in ((3.0, True), (1.1, False), (0.5, False)):
+        edge = one_face([[0, -3, height * h], [0, 3, height * h], [0, 0, 3]])
+        for pair in ((ridge, edge), (edge, ridge)):
+            assert listing_2(*pair, 0.0, thickness=0.5 * h)[0] == apart
+
+
 def test_coplanar_faces():
     """In one plane nothing pierces, side by side is apart, overlapping is not."""
     square = one_face(SQUARE)
