@@ -65,6 +65,29 @@ def random_rigid_motion(
     return rigid_motion(quaternions, rng.uniform(-size, size, (3, 3)))
 
 
+def rational_curve(quaternions: np.ndarray, path: np.ndarray) -> RationalMotion:
+    """
+    Return the rotations of a curve of quaternions, and a rational curve of translations.
+
+    :param quaternions: (5, 4) control points, real part first; not so far apart that a weight
+        vanishes.
+    :param path: (9, 3) control points of the translation.
+    """
+    turns = rigid_motion(quaternions, np.zeros((1, 3)))
+    control = turns.control_points.copy()
+    control[:, :, 3] = path
+    return RationalMotion(control, turns.weights)
+
+
+def random_curve(
+    rng: np.random.Generator, scale: float = 1.0, turn: float = 0.3, shift: float = 1.0
+) -> RationalMotion:
+    """Return a random motion of degree 8; its translations are about a scale long."""
+    quaternions = [1, 0, 0, 0] + turn * np.cumsum(rng.normal(size=(5, 4)), axis=0) / 2.0
+    line = np.linspace(-1, 1, 9)[:, None] * rng.normal(size=3) + 0.2 * rng.normal(size=(9, 3))
+    return rational_curve(quaternions, scale * shift * line)
+
+
 def exact_pose(motion: RationalMotion, s: Fraction) -> list[list[Fraction]]:
     """Return the (3, 4) displacement at s, exactly."""
     n = motion.degree
