@@ -193,8 +193,9 @@ def test_one_solid_inside_the_other(swap):
     assert [(s.start, s.end, s.why, s.kind) for s in found.suspect] == [
         (0.0, 1.0, Why.CONTAINED, Kind.CONTAINED)
     ]
-    open_box = Polyhedron(fixed.vertices, fixed.faces[:5])
-    assert collide(moving, open_box, motion, epsilon=0.01).free == ((0.0, 1.0),)
+    pair[1] = Polyhedron(pair[1].vertices, pair[1].faces[:5])
+    moving, fixed = pair[::-1] if swap else pair
+    assert collide(moving, fixed, motion, epsilon=0.01).free == ((0.0, 1.0),)
 
 
 def test_one_of_two_parts_inside():
@@ -405,3 +406,16 @@ def test_refused(change, message):
     asked = {'motion': rational_curve(STILL, np.ones((9, 3))), 'epsilon': 0.1}
     with pytest.raises(RequestError, match=message):
         collide(grid(1), grid(1), **{**asked, **change})
+
+
+@pytest.mark.parametrize('solid_moves', [True, False])
+def test_a_sheet_inside_a_solid_is_not_free(solid_moves):
+    """A surface that is not closed has no inside, but it may be inside."""
+    sheet, solid = scaled(grid(2), 0.2), box((1.0, 1.0, 1.0))
+    motion = rational_curve(STILL, [[0.01 * k, 0.0, 0.0] for k in range(9)])
+    pair = (solid, sheet) if solid_moves else (sheet, solid)
+    found = collide(*pair, motion, epsilon=0.01)
+    assert found.free == ()
+    assert found.suspect[0].why is Why.CONTAINED
+    away = collide(*pair, shifted(motion, [5.0, 0.0, 0.0]), epsilon=0.01)
+    assert away.free == ((0.0, 1.0),)

@@ -118,8 +118,8 @@ def collisions(
     :param max_tests: tests before what is left is given up as suspect.
     :param threads: to share the hierarchical search; the answer does not depend on it.
     :param stop: (1,) int64 that another thread sets to have the rest given up as suspect.
-    :returns: free and suspect intervals. Free is proved, of surfaces and, where both polyhedra are
-        watertight, of solids: neither is inside the other.
+    :returns: free and suspect intervals. Free is proved: of surfaces, and where a polyhedron is
+        watertight, of the solid: nothing of the other is inside.
     :raises RequestError: naming the argument and its value.
     """
     curve = curve_of(motion)
@@ -178,7 +178,7 @@ def _answer(pair: Pair, curve: Curve, done: list[ball.Covered]) -> Collisions:
     free = _complement(suspects)
     kept = []
     for start, end in free:
-        if pair.solids and not surely_apart(*pair.solids, curve, 0.5 * (start + end)):
+        if not surely_apart(*pair.probes, curve, 0.5 * (start + end)):
             named = (Why.CONTAINED, Kind.CONTAINED, -1, -1, (), (), None)
             suspects.append(Suspect(start, end, *named))
         else:

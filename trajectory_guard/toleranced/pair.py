@@ -7,7 +7,7 @@ import numpy as np
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.kernels.ball import Packed
 from trajectory_guard.polyhedron import Polyhedron
-from trajectory_guard.toleranced.containment import Solid, solid
+from trajectory_guard.toleranced.containment import Probe, probe
 from trajectory_guard.toleranced.face_moments import given_moments
 from trajectory_guard.toleranced.node_metric import node_metric
 from trajectory_guard.toleranced.surface import surface
@@ -21,13 +21,13 @@ class Pair:
     :param moving: in its own frame.
     :param fixed: in the frame of the motions' images.
     :param packed: both as the kernels take them, and the metric of the moving one.
-    :param solids: both, if they are watertight.
+    :param probes: both, to see whether one is inside the other.
     """
 
     moving: Polyhedron
     fixed: Polyhedron
     packed: Packed
-    solids: tuple[Solid, Solid] | None
+    probes: tuple[Probe, Probe]
 
 
 def pair_of(
@@ -59,9 +59,8 @@ def pair_of(
         whole = given_moments(G)
     own = surface(moving)
     metric = node_metric(own, individual, whole)
-    closed = moving.watertight and fixed.watertight
-    solids = (solid(moving), solid(fixed)) if closed else None
-    return Pair(moving, fixed, Packed(own, surface(fixed), metric), solids)
+    probes = probe(moving), probe(fixed)
+    return Pair(moving, fixed, Packed(own, surface(fixed), metric), probes)
 
 
 def _invalid(message: str) -> RequestError:
