@@ -21,7 +21,7 @@ from trajectory_guard.multi_dof_path import multi_dof_path
 from trajectory_guard.refine import cover_refined, Seen
 from trajectory_guard.request import check_joints, motion_path, refusal, tracking_slack
 from trajectory_guard.result import Interval, NANOSECONDS, Result, Status, Verdict
-from trajectory_guard.settings import Settings
+from trajectory_guard.settings import Cover, Settings
 from trajectory_guard.timeline import intervals, with_witnesses
 from trajectory_guard.trajectory import JointState, Trajectory
 from trajectory_guard.workcell import Pairs, Workcell
@@ -203,9 +203,28 @@ def _job(workcell: Workcell, path: JointPath, slack: np.ndarray, begin: float) -
 
 
 def _cover(workcell: Workcell, jobs: Sequence[_Job], settings: Settings) -> list[Seen | None]:
-    questions = [Question(job.motion, job.pairs.moving) for job in jobs]
     with stop_flag(settings.deadline_ns) as stop:
+        if settings.cover is Cover.BALL:
+            return _cover_by_balls(workcell, jobs, settings, stop)
+        questions = [Question(job.motion, job.pairs.moving) for job in jobs]
         return cover_refined(workcell.detail, questions, settings, stop)
+
+
+def _cover_by_balls(
+    workcell: Workcell, jobs: Sequence[_Job], settings: Settings, stop: np.ndarray
+) -> list[Seen | None]:
+    # Brings scipy.
+    from trajectory_guard.ball_cover import cover_by_balls
+
+    return [
+        None
+        if refusal(job.path, job.slack)
+        else Seen(
+            cover_by_balls(workcell, job.path, job.slack, job.pairs.moving, settings, stop),
+            workcell.detail.level,
+        )
+        for job in jobs
+    ]
 
 
 def _result(

@@ -24,6 +24,32 @@ class Scope(IntEnum):
     VERDICT = 2
 
 
+class Cover(IntEnum):
+    """
+    How a motion is enclosed.
+
+    HULL: by the convex hull of its control points and separating planes. BALL: by balls in the
+    space of affine displacements [Schroecker & Weber 2014]; it proves no collisions, and writes
+    no certificates.
+    """
+
+    HULL = 0
+    BALL = 1
+
+    @classmethod
+    def named(cls, name: str) -> 'Cover':
+        """
+        Return the cover of a name in lower case.
+
+        :raises RequestError: there is none.
+        """
+        for cover in cls:
+            if name == cover.name.lower():
+                return cover
+        names = ', '.join(cover.name.lower() for cover in cls)
+        raise RequestError(Reason.INVALID_PARAMETER, f'cover {name!r} is not one of {names}')
+
+
 @dataclass(frozen=True, slots=True)
 class Settings:
     """
@@ -36,6 +62,7 @@ class Settings:
     :param deadline_ns: wall-clock time for the answer; the rest is *suspect* [ns]; None: no limit.
     :param max_pieces: motion pieces that may be examined; the rest is *suspect*.
     :param scope: how much of the motion is asked about.
+    :param cover: how the motion is enclosed.
     :param want_certificate: write down what proves each answer.
     :param allowed_start_tolerance: start state against a point 0 at time 0 [rad or m].
     :param joint_limit_tolerance: how far the curve may leave the joint limits [rad or m].
@@ -50,6 +77,7 @@ class Settings:
     deadline_ns: int | None = None
     max_pieces: int = 200_000
     scope: Scope = Scope.ALL
+    cover: Cover = Cover.HULL
     want_certificate: bool = False
     allowed_start_tolerance: float = 0.01
     joint_limit_tolerance: float = 1e-6
@@ -79,6 +107,11 @@ class Settings:
                     Reason.INVALID_TRACKING_TOLERANCE,
                     f'tracking_tolerance must be finite and >= 0, got {value!r}',
                 )
+        if self.want_certificate and self.cover is not Cover.HULL:
+            raise RequestError(
+                Reason.INVALID_PARAMETER,
+                f'certificates are written of the cover hull, not {self.cover.name.lower()}',
+            )
         if self.deadline_ns is not None and self.deadline_ns < 0:
             raise RequestError(
                 Reason.INVALID_DEADLINE, f'deadline must be >= 0 s, got {self.deadline_ns} ns'

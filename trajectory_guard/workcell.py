@@ -1,9 +1,11 @@
 """A robot and its scene together, packed once for every request."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trajectory_guard.body import ConvexBody
 from trajectory_guard.detail import Detail
 from trajectory_guard.errors import Reason, RobotError, SceneError
 from trajectory_guard.kernels.layout import Extents, FAR, NODE, Packed, Path, Solids, UP
@@ -12,6 +14,9 @@ from trajectory_guard.pack import boxes, perpendicular, solids
 from trajectory_guard.robot import Robot
 from trajectory_guard.scene import Scene
 from trajectory_guard.tree import Tree, tree
+
+if TYPE_CHECKING:
+    from trajectory_guard.ball_cover import BallCell
 
 # Sets of commanded joints whose pairs are kept; clients choose them, so their number is bounded.
 MOST_KEPT = 64
@@ -62,7 +67,9 @@ class Workcell:
     link_nodes: np.ndarray = field(init=False)
     packed: Packed = field(init=False, repr=False)
     detail: Detail = field(init=False, repr=False)
+    _bodies: tuple[tuple[ConvexBody, ...], tuple[ConvexBody, ...]] = field(init=False, repr=False)
     _pairs: dict[bytes, Pairs] = field(init=False, repr=False, default_factory=dict)
+    _ball_cells: 'list[BallCell]' = field(init=False, repr=False, default_factory=list)
 
     def __post_init__(self) -> None:
         """Load the geometry and pack it."""
@@ -85,6 +92,7 @@ class Workcell:
         if not obstacle_names:
             raise SceneError(Reason.SCENE_EMPTY, 'the scene has no obstacle')
         targets = [b for o in self.scene.obstacles for b in o.bodies]
+        keep('_bodies', (tuple(bodies), tuple(targets)))
         keep('tree', folded)
         keep('links', solids(bodies, [folded.link_node[name] for name in names]))
         keep('obstacles', solids(targets, [-1] * len(targets)))
@@ -113,6 +121,17 @@ class Workcell:
         keep('packed', detail.level.packed)
         keep('robot_hash', self.robot.digest())
         keep('scene_hash', self.scene.digest)
+
+    @property
+    def ball_cell(self) -> 'BallCell':
+        """The bodies as polyhedra, made when first asked for."""
+        # Brings scipy.
+        from trajectory_guard.ball_cover import BallCell
+
+        if not self._ball_cells:
+            # Two threads may both make one; either will do.
+            self._ball_cells.append(BallCell(*self._bodies))
+        return self._ball_cells[0]
 
     @property
     def refinable(self) -> frozenset[str]:

@@ -51,6 +51,7 @@ def check(
     allow_end_velocity: options.AllowEndVelocity = False,
     deadline: options.Deadline = None,
     scope: options.ScopeOption = _DEFAULTS.scope,
+    cover: options.CoverOption = _DEFAULTS.cover,
     certificate: options.Certificate = None,
     json: options.Json = False,
 ) -> None:
@@ -61,6 +62,7 @@ def check(
         tracking_tolerance=(tracking_tolerance,),
         deadline_ns=deadline,
         scope=scope,
+        cover=cover,
         want_certificate=certificate is not None,
         check_joint_limits=not no_joint_limits,
         allow_nonzero_end_velocity=allow_end_velocity,
@@ -97,6 +99,7 @@ def replay(
     allow_end_velocity: options.AllowEndVelocity = False,
     deadline: options.Deadline = None,
     scope: options.ScopeOption = _DEFAULTS.scope,
+    cover: options.CoverOption = _DEFAULTS.cover,
     certificate: options.Certificate = None,
     json: options.Json = False,
 ) -> None:
@@ -107,6 +110,7 @@ def replay(
         tracking_tolerance=(tracking_tolerance,),
         deadline_ns=deadline,
         scope=scope,
+        cover=cover,
         want_certificate=certificate is not None,
         check_joint_limits=not no_joint_limits,
         allow_nonzero_end_velocity=allow_end_velocity,

@@ -10,7 +10,7 @@ import typer
 
 from trajectory_guard.errors import RequestError
 from trajectory_guard.result import NANOSECONDS
-from trajectory_guard.settings import Scope, Settings
+from trajectory_guard.settings import Cover, Scope, Settings
 
 # Thirty years; timers fail at three hundred [s].
 LONGEST_DEADLINE = 1e9
@@ -122,6 +122,16 @@ def _parse_scope(text: str | Scope) -> Scope:
     raise typer.BadParameter(f'{text!r} is not one of {names}')
 
 
+def _parse_cover(text: str | Cover) -> Cover:
+    """Return the cover of that name; the default comes as it is."""
+    if isinstance(text, Cover):
+        return text
+    try:
+        return Cover.named(text)
+    except RequestError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
 _FILE: dict[str, Any] = {'exists': True, 'dir_okay': False, 'readable': True}
 _LENGTH: dict[str, Any] = {'metavar': 'METRES', 'show_default': True}
 
@@ -225,6 +235,16 @@ ScopeOption = Annotated[
         metavar='|'.join(scope.name.lower() for scope in Scope),
         show_default='all',
         help='How much is asked: all intervals, up to the first that is not free, or any.',
+    ),
+]
+CoverOption = Annotated[
+    Cover,
+    typer.Option(
+        '--cover',
+        parser=_parse_cover,
+        metavar='|'.join(cover.name.lower() for cover in Cover),
+        show_default='hull',
+        help='How motions are enclosed: by hulls and planes, or by balls of displacements.',
     ),
 ]
 Json = Annotated[

@@ -10,7 +10,7 @@ import numpy as np
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.pose import pose_matrix
 from trajectory_guard.result import NANOSECONDS
-from trajectory_guard.settings import Settings
+from trajectory_guard.settings import Cover, Settings
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +82,7 @@ class Configuration:
                 tracking_tolerance=tuple(values['tracking_tolerance'] or ()),
                 deadline_ns=round(values['deadline'] * NANOSECONDS),
                 max_pieces=values['max_pieces'],
+                cover=Cover.named(values['cover']),
                 allowed_start_tolerance=values['allowed_start_tolerance'],
                 joint_limit_tolerance=values['joint_limit_tolerance'],
                 check_joint_limits=values['check_joint_limits'],

@@ -75,6 +75,10 @@ DECLARATIONS = {
         'pieces of motion examined for an answer, what is left then is suspect',
         (1, 100_000_000),
     ),
+    'cover': Declaration(
+        _DEFAULTS.cover.name.lower(),
+        'how motions are enclosed: hull, or ball, which proves no collisions and is slower',
+    ),
     'allowed_start_tolerance': Declaration(
         _DEFAULTS.allowed_start_tolerance,
         'how far the start state may be off a first point at time 0 [rad or m]',

@@ -1,0 +1,241 @@
+"""The cover by balls of displacements: the same arms and bodies, and never a wrong free."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from bench_data import cases, ROBOTS, SETTINGS, workcell
+import coal
+import numpy as np
+import pytest
+from rational_curves import random_rigid_motion
+from typer.testing import CliRunner
+
+from trajectory_guard.body import ConvexBody
+from trajectory_guard.certify import certify, judge
+from trajectory_guard.command_line.app import app
+from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.facets import faceted, joined
+from trajectory_guard.floating_path import floating_path
+from trajectory_guard.free_body import free_body
+from trajectory_guard.free_path import FreePath
+from trajectory_guard.motion import RationalMotion
+from trajectory_guard.primitive import Box, Cylinder, Sphere
+from trajectory_guard.result import Status, Verdict
+from trajectory_guard.scene import Obstacle, Scene
+from trajectory_guard.settings import Cover, Scope, Settings
+from trajectory_guard.trajectory import JointState
+from trajectory_guard.urdf import robot_from_urdf
+from trajectory_guard.workcell import Workcell
+
+SECOND = 10**9
+BALLS = Settings(cover=Cover.BALL, tolerance=1e-3)
+RNG = np.random.default_rng(3)
+BODIES = {
+    'box': Box((0.3, 0.2, 0.1)).load().body,
+    'sphere': Sphere(0.1).load().body,
+    'cylinder': Cylinder(0.05, 0.4).load().body,
+    'point': ConvexBody(np.array([[1.0, 2.0, 3.0]])),
+    'capsule': ConvexBody(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), ball=0.1),
+    'plate': ConvexBody(np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])),
+    'coin': ConvexBody(np.zeros((1, 3)), disc_radius=0.2),
+    'cloud': ConvexBody(RNG.normal(size=(200, 3)), ball=1e-4),
+    'grid': ConvexBody(
+        np.array([[x, y, z] for x in range(4) for y in range(4) for z in range(4)], float)
+    ),
+    'far': ConvexBody(1e6 + RNG.uniform(size=(20, 3))),
+    'tiny': ConvexBody(1e-6 * RNG.uniform(size=(20, 3))),
+}
+
+
+@pytest.mark.parametrize('name', BODIES)
+def test_a_polyhedron_contains_its_body(name: str) -> None:
+    """In every direction it reaches at least as far, with its ball, and not much farther."""
+    body = BODIES[name]
+    polyhedron, ball = faceted(body)
+    assert polyhedron.watertight
+    directions = np.random.default_rng(1).normal(size=(300, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    along = directions @ body.disc_axis
+    disc = body.disc_radius * np.sqrt(np.maximum(0.0, 1.0 - along**2))
+    wanted = (directions @ body.vertices.T).max(axis=1) + disc + body.ball
+    reached = (directions @ polyhedron.vertices.T).max(axis=1) + ball
+    size = np.ptp(body.vertices, axis=0).max() + body.disc_radius + body.ball
+    rounding = 1e-15 * np.abs(body.vertices).max()
+    assert (reached >= wanted - rounding).all()
+    assert (reached <= wanted + 0.02 * size + 1e-8).all()
+
+
+def test_an_open_mesh_stays_open_and_a_hull_is_closed(tmp_path) -> None:
+    one, other = (faceted(BODIES[name]).polyhedron for name in ('box', 'sphere'))
+    both, owner = joined([one, other])
+    assert both.watertight
+    assert len(both.faces) == len(one.faces) + len(other.faces)
+    assert owner.tolist() == [0] * len(one.faces) + [1] * len(other.faces)
+
+
+@pytest.mark.parametrize('robot', ROBOTS)
+def test_arms_are_judged_as_the_truth_has_it(robot: str) -> None:
+    """No interval that is in contact is free, and free trajectories are."""
+    cell = workcell(robot)
+    for trajectory, truth, _ in cases(robot)[::8]:
+        result = judge(
+            cell, trajectory, settings=replace(SETTINGS, cover=Cover.BALL, tolerance=1e-3)
+        )
+        hull = judge(cell, trajectory, settings=replace(SETTINGS, tolerance=1e-3))
+        assert result.intervals[0].start_ns == 0
+        assert result.intervals[-1].end_ns == result.duration_ns
+        assert (result.verdict is Verdict.FREE) == (hull.verdict is Verdict.FREE)
+        assert Status.COLLISION not in {row.status for row in result.intervals}
+        for begin, end in truth['contact_core']:
+            for row in result.intervals:
+                overlap = row.start_ns < end * SECOND and begin * SECOND < row.end_ns
+                assert not (row.status is Status.FREE and overlap)
+
+
+def single(moving, obstacle, at=(0.0, 0.0, 0.0)) -> Workcell:
+    T = np.eye(4)
+    T[:3, 3] = at
+    body = obstacle.load().body.moved(T)
+    return Workcell(free_body('part', moving), Scene((Obstacle('thing', (body,)),), ''))
+
+
+SHAPES = [
+    (Box((0.3, 0.2, 0.1)), coal.Box(0.3, 0.2, 0.1)),
+    (Sphere(0.1), coal.Sphere(0.1)),
+    (Cylinder(0.05, 0.4), coal.Cylinder(0.05, 0.4)),
+]
+
+
+@pytest.mark.parametrize('shape', range(3))
+def test_free_bodies_are_judged_as_another_library_samples_them(shape: int) -> None:
+    moving, one = SHAPES[shape]
+    rng = np.random.default_rng(shape)
+    seen = dict.fromkeys(Status, 0)
+    for k in range(45):
+        obstacle, other = SHAPES[k % 3]
+        motion = random_rigid_motion(rng)
+        result = certify(single(moving, obstacle), FreePath.exact([motion], [0, SECOND]), BALLS)
+        for row in result.intervals:
+            seen[row.status] += 1
+            for s in np.linspace(row.start_ns, row.end_ns, 15) / SECOND:
+                pose = motion.pose(s)
+                gap = coal.distance(
+                    one,
+                    coal.Transform3s(pose[:, :3], pose[:, 3]),
+                    other,
+                    coal.Transform3s(),
+                    coal.DistanceRequest(),
+                    coal.DistanceResult(),
+                )
+                assert not (row.status is Status.FREE and gap < -1e-7)
+    assert seen[Status.FREE] > 30
+    assert seen[Status.SUSPECT] > 3
+
+
+def test_what_is_inside_is_not_free() -> None:
+    """A small ball deep in a large box never meets its faces."""
+    motion = random_rigid_motion(np.random.default_rng(1), size=0.1)
+    work = single(Sphere(0.01), Box((2.0, 2.0, 2.0)))
+    result = certify(work, FreePath.exact([motion], [0, SECOND]), BALLS)
+    (row,) = result.intervals
+    assert (row.status, row.reason) == (Status.SUSPECT, 'enclosure')
+    assert (row.body, row.obstacle) == ('part', 'thing')
+
+
+@pytest.mark.parametrize(
+    ('settings', 'reason'),
+    [
+        ({'max_pieces': 0}, 'budget'),
+        ({'deadline_ns': 0}, 'deadline'),
+    ],
+)
+def test_what_is_spent_is_suspect(settings: dict, reason: str) -> None:
+    motion = random_rigid_motion(np.random.default_rng(1))
+    work = single(Box((1.0, 1.0, 1.0)), Box((1.0, 1.0, 1.0)))
+    asked = Settings(cover=Cover.BALL, **settings)
+    result = certify(work, FreePath.exact([motion], [0, SECOND]), asked)
+    assert [row.status for row in result.intervals] == [Status.SUSPECT]
+    assert result.intervals[0].reason == reason
+
+
+def test_tolerances_are_kept_away_as_by_the_hull() -> None:
+    points = np.zeros((2, 3, 4))
+    points[:, :, :3] = np.eye(3)
+    points[0, :, 3], points[1, :, 3] = (-1.0, 0.25, 0.0), (1.0, 0.25, 0.0)
+    path = FreePath.exact([RationalMotion(points, np.ones(2))], [0, SECOND])
+    work = single(Box((0.2, 0.2, 0.2)), Box((0.2, 0.2, 0.2)))
+    corner = float(np.sqrt(3) * 0.1)
+    for settings, free in (
+        ({'clearance': 0.04}, True),
+        ({'clearance': 0.051}, False),
+        ({'tracking_tolerance': (0.04, 0.0)}, True),
+        ({'tracking_tolerance': (0.051, 0.0)}, False),
+        ({'tracking_tolerance': (0.0, 0.04 / corner)}, True),
+        ({'tracking_tolerance': (0.0, 0.051 / corner)}, False),
+    ):
+        result = certify(work, path, Settings(cover=Cover.BALL, tolerance=1e-3, **settings))
+        assert (result.verdict is Verdict.FREE) == free
+
+
+def test_the_first_suspect_segment_may_be_the_last_to_be_looked_at() -> None:
+    rng = np.random.default_rng(5)
+    work = single(Box((0.4, 0.4, 0.4)), Box((1.0, 1.0, 1.0)))
+    motions = [random_rigid_motion(rng, size=0.3) for _ in range(3)]
+    path = FreePath.exact(motions, [0, SECOND, 2 * SECOND, 3 * SECOND])
+    result = certify(work, path, Settings(cover=Cover.BALL, scope=Scope.FIRST))
+    assert result.intervals[-1].reason == 'not_examined'
+    assert result.verdict is Verdict.SUSPECT
+
+
+def test_no_certificate_is_promised_of_balls() -> None:
+    with pytest.raises(RequestError, match='cover hull') as caught:
+        Settings(cover=Cover.BALL, want_certificate=True)
+    assert caught.value.reason is Reason.INVALID_PARAMETER
+
+
+def test_the_command_line_takes_a_cover(tmp_path) -> None:
+    mesh = Path(__file__).parent / 'data' / 'bench' / 'scene.urdf'
+    robot = tmp_path / 'cart.urdf'
+    robot.write_text(
+        '<robot name="r"><link name="map"/><link name="cart"><collision><geometry>'
+        '<sphere radius="0.01"/></geometry></collision></link><joint name="j" type="prismatic">'
+        '<parent link="map"/><child link="cart"/><axis xyz="0 0 1"/><origin xyz="9 9 9"/>'
+        '<limit lower="0" upper="2"/></joint></robot>'
+    )
+    file = tmp_path / 'trajectory.yaml'
+    file.write_text(
+        'joint_names: [j]\npoints:\n- {positions: [0], time_from_start: {sec: 0, nanosec: 0}}\n'
+        '- {positions: [1], time_from_start: {sec: 1, nanosec: 0}}\n'
+    )
+    given = ['--urdf', str(robot), '--scene', str(mesh), str(file), '--cover']
+    run = CliRunner().invoke(app, ['check', *given, 'ball'])
+    assert run.exit_code == 0, run.output
+    run = CliRunner().invoke(app, ['check', *given, 'cube'])
+    assert run.exit_code == 2
+    assert "cover 'cube'" in run.stderr
+
+
+def test_a_floating_joint_may_hang_anywhere_at_the_root() -> None:
+    """Its fixed pose counts, and a joint that stands before it does not."""
+    robot = robot_from_urdf(
+        '<robot name="r"><link name="map"/><link name="arm"><collision><geometry>'
+        '<sphere radius="0.01"/></geometry></collision></link><link name="cart"><collision>'
+        '<geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>'
+        '<joint name="a" type="prismatic"><parent link="map"/><child link="arm"/>'
+        '<axis xyz="0 0 1"/><origin xyz="50 0 0"/><limit lower="0" upper="2"/></joint>'
+        '<joint name="drive" type="floating"><parent link="map"/><child link="cart"/>'
+        '<origin xyz="0 0 1" rpy="0 0 1.5707963267948966"/></joint></robot>'
+    )
+    T = np.eye(4)
+    T[:3, 3] = (0.0, 1.0, 1.0)
+    post = Box((0.2, 0.2, 0.2)).load().body.moved(T)
+    work = Workcell(robot, Scene((Obstacle('post', (post,)),), ''))
+    points = np.zeros((2, 3, 4))
+    points[:, :, :3] = np.eye(3)
+    points[1, 0, 3] = 2.0  # along x of the joint, y of the root
+    free = FreePath.exact([RationalMotion(points, np.ones(2))], [0, SECOND], 'drive')
+    held = floating_path(robot, free, JointState(('a',), np.array([0.0])))
+    for cover in Cover:
+        first = certify(work, held, Settings(cover=cover, tolerance=1e-3)).intervals[0]
+        assert first.status is Status.FREE
+        assert first.end_ns == pytest.approx(0.4 * SECOND, abs=2e-3 * SECOND)
