@@ -1,11 +1,19 @@
-"""Random rational motions, and their exact value."""
+"""Rational motions of free bodies, given or random, and their exact value."""
 
 from fractions import Fraction
 from math import comb
+from typing import NamedTuple
 
 import numpy as np
 
 from trajectory_guard.motion import RationalMotion
+
+
+class RationalCurve(NamedTuple):
+    """Control points (K, 3, 4) and positive Bernstein weights (K,)."""
+
+    control_points: np.ndarray
+    weights: np.ndarray
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -87,3 +95,31 @@ def exact_image(motion: RationalMotion, s: Fraction, x: np.ndarray) -> list[Frac
     """Return where a point is at s, exactly."""
     y = [*map(Fraction, x.tolist()), Fraction(1)]
     return [sum(a * b for a, b in zip(row, y, strict=True)) for row in exact_pose(motion, s)]
+
+
+def rational_curve(quaternions, path):
+    """
+    Return the rotations of a curve of quaternions, and a rational curve of translations.
+
+    :param quaternions: (5, 4) control points w, x, y, z; not so far apart that a weight vanishes.
+    :param path: (9, 3) control points of the translation.
+    """
+    w, x, y, z = np.asarray(quaternions, dtype=float).T
+    ww, xx, yy, zz = (product(q, q) for q in (w, x, y, z))
+    xy, xz, yz = product(x, y), product(x, z), product(y, z)
+    wx, wy, wz = product(w, x), product(w, y), product(w, z)
+    weights = ww + xx + yy + zz
+    rows = [
+        [ww + xx - yy - zz, 2 * (xy - wz), 2 * (xz + wy)],
+        [2 * (xy + wz), ww - xx + yy - zz, 2 * (yz - wx)],
+        [2 * (xz - wy), 2 * (yz + wx), ww - xx - yy + zz],
+    ]
+    turns = np.moveaxis(np.array(rows) / weights, -1, 0)
+    return RationalCurve(np.concatenate([turns, np.asarray(path)[:, :, None]], axis=2), weights)
+
+
+def random_curve(rng, scale=1.0, turn=0.3, shift=1.0):
+    """Return a random motion; its translations are about a scale long."""
+    quaternions = [1, 0, 0, 0] + turn * np.cumsum(rng.normal(size=(5, 4)), axis=0) / 2.0
+    line = np.linspace(-1, 1, 9)[:, None] * rng.normal(size=3) + 0.2 * rng.normal(size=(9, 3))
+    return rational_curve(quaternions, scale * shift * line)

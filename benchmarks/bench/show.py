@@ -28,6 +28,10 @@ TITLES = {
     'threads': 'A batch on one thread and on two',
     'budget': 'The free trajectory with the most pieces, within a budget of pieces',
     'certificate': 'Certificates',
+    'octagons': 'Two octagons [Schroecker & Weber 2014, sec. 7.1]',
+    'squares': 'Two squares of n x n squares [Schroecker & Weber 2014, tables 1 and 2]',
+    'scaling': 'Exponents of growth in the number of pairs of polygons (1: linear)',
+    'which': 'Tests by moving square, plain listing [Schroecker & Weber 2014, figures 5 and 6]',
 }
 
 

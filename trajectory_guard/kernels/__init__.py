@@ -13,6 +13,10 @@ inequalities in ``separation.hpp`` and ``cull.hpp``; rounding in ``margin.hpp``;
 ``cover.hpp``, ``pair.hpp`` and ``leaf.hpp``; for collisions ``witness.hpp`` and the depths of
 ``deepest.hpp``.  *Untrusted*, may only propose: ``gjk.hpp`` and the search in ``deepest.hpp``.
 
+A unit of its own, ``ball.cpp``, covers free rational motions of polyhedra by balls; of it
+``ball_cover.hpp``, ``ball.hpp``, ``cluster.hpp``, ``fat_polygon.hpp`` and ``quadratic.hpp`` are
+trusted, but for the guess whether two polygons cross.
+
 Shared conventions: ``tau`` runs over [-1, 1] on a piece; a *node* is a movable joint, its frame
 moves with the joint and has the joint axis as z.
 """

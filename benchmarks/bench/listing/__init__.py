@@ -1,0 +1,1 @@
+"""The experiments of Schroecker & Weber (2014), section 7."""

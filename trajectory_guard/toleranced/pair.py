@@ -1,0 +1,68 @@
+"""Two polyhedra, prepared for any number of motions of one of them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.kernels.ball import Packed
+from trajectory_guard.polyhedron import Polyhedron
+from trajectory_guard.toleranced.containment import Solid, solid
+from trajectory_guard.toleranced.face_moments import given_moments
+from trajectory_guard.toleranced.node_metric import node_metric
+from trajectory_guard.toleranced.surface import surface
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pair:
+    """
+    A moving and a fixed polyhedron.
+
+    :param moving: in its own frame.
+    :param fixed: in the frame of the motions' images.
+    :param packed: both as the kernels take them, and the metric of the moving one.
+    :param solids: both, if they are watertight.
+    """
+
+    moving: Polyhedron
+    fixed: Polyhedron
+    packed: Packed
+    solids: tuple[Solid, Solid] | None
+
+
+def pair_of(
+    moving: Polyhedron,
+    fixed: Polyhedron,
+    *,
+    individual: bool = True,
+    moments: np.ndarray | None = None,
+) -> Pair:
+    """
+    Prepare two polyhedra.
+
+    :param moving: in its own frame.
+    :param fixed: in the frame of the motions' images.
+    :param individual: each moving face has its own mass distribution, equal masses at its corners
+        and over its barycentre; or all have the sum of these.
+    :param moments: (4, 4) matrix G = sum of w_i [m_i; 1] [m_i; 1]^T of the distribution for all
+        [m^2].
+    :raises RequestError: moments is not a finite (4, 4) matrix of positive mass, or given for
+        individual distributions.
+    """
+    whole = None
+    if moments is not None:
+        G = np.asarray(moments, dtype=np.float64)
+        if individual:
+            raise _invalid('moments are for one distribution, not for individual ones')
+        if G.shape != (4, 4) or not np.isfinite(G).all() or not G[3, 3] > 0.0:
+            raise _invalid(f'moments must be (4, 4), finite, of positive mass, got {G.tolist()}')
+        whole = given_moments(G)
+    own = surface(moving)
+    metric = node_metric(own, individual, whole)
+    closed = moving.watertight and fixed.watertight
+    solids = (solid(moving), solid(fixed)) if closed else None
+    return Pair(moving, fixed, Packed(own, surface(fixed), metric), solids)
+
+
+def _invalid(message: str) -> RequestError:
+    return RequestError(Reason.INVALID_PARAMETER, message)
