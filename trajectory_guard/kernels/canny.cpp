@@ -28,15 +28,4 @@ int guard_overlap(const Polyhedron* a, const Course* course_a, const Polyhedron*
 } catch (const std::bad_alloc&) {
   return 1;
 }
-
-// Test doors: the basis (25, degree + 1) with its errors, and the stretches of one polynomial.
-int guard_basis(const Course* a, const Course* b, double* c, double* error) {
-  Polynomial basis[BASIS];
-  if (!relative_basis(*a, *b, basis)) return 2;
-  for (int i = 0; i < BASIS; i++) {
-    for (int k = 0; k <= basis[i].degree; k++) *c++ = basis[i].c[k];
-    error[i] = basis[i].error;
-  }
-  return 0;
-}
 }

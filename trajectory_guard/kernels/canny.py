@@ -15,8 +15,6 @@ UNIT = Path(__file__).with_suffix('.cpp')
 CLOSED_FORM = 0  # of cubics; of other degrees by halving and secants
 HALVING = 1
 
-BASIS = 25  # polynomials of a relative motion
-
 _POINTER = ctypes.c_void_p
 _INTEGER = ctypes.c_int64
 
@@ -148,22 +146,3 @@ def kernel_overlap(
 def _rows(spans: Any, count: int) -> list[tuple[float, float]]:
     flat = spans[: 2 * count] if count else []
     return list(zip(flat[::2], flat[1::2], strict=True))
-
-
-def kernel_basis(
-    course_a: CourseStructure, course_b: CourseStructure, degree: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """
-    Return the relative motion with bounds on its error, for those who want to look at it.
-
-    :returns: (BASIS, degree + 1) Bernstein coefficients, (BASIS,) errors.
-    """
-    coefficients = np.empty((BASIS, degree + 1))
-    errors = np.empty(BASIS)
-    load(UNIT).guard_basis(
-        ctypes.byref(course_a),
-        ctypes.byref(course_b),
-        _POINTER(address(coefficients)),
-        _POINTER(address(errors)),
-    )
-    return coefficients, errors
