@@ -6,8 +6,8 @@ using namespace guard;
 extern "C" {
 
 // The stretches (n, 3) of a polynomial; returns n, at most `room`.
-int64_t canny_stretches(const double* c, int64_t degree, double error, int64_t method,
-                        int64_t room, double* out) {
+int64_t canny_stretches(const double* c, int64_t degree, double error, int64_t method, int64_t room,
+                        double* out) {
   Polynomial f;
   f.degree = int(degree);
   for (int64_t k = 0; k <= degree; k++) f.c[k] = c[k];
