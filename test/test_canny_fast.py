@@ -1,4 +1,4 @@
-"""Rounded contact times: what is certain is so, exactly, and what is possible leaves nothing out."""
+"""Rounded contact times: what is certain is so, what is possible leaves nothing out, exactly."""
 
 import ctypes
 from fractions import Fraction

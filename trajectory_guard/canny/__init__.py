@@ -8,7 +8,8 @@ s, and overlap a disjunction of conjunctions of signs.
 *Exact*: :func:`overlaps` (one mover or two), :func:`pairwise` (several). All numbers given are
 taken as exact, all answers are proved, ends of overlaps come with enclosures and contacts.
 *Rounded, with bounds*: :func:`fast_overlap`, microseconds a pair; its *possible* spans contain
-every overlap and its *certain* ones nothing else.
+every overlap and its *certain* ones nothing else. :func:`linear_contacts` and
+:func:`linear_answers` are the same for four points on straight lines.
 
 Quaternions are (q0, q1, q2, q3), scalar first, of any length but 0: the rotation by
 2 atan2(|q|, q0) about q. Lengths are metres. Bodies are closed: touching is overlap.
@@ -17,21 +18,27 @@ Quaternions are (q0, q1, q2, q3), scalar first, of any length but 0: the rotatio
 from trajectory_guard.canny.constraint import Kind
 from trajectory_guard.canny.contact import Contact
 from trajectory_guard.canny.fast import fast_overlap, FastOverlap
+from trajectory_guard.canny.linear import Answer, linear_answers, linear_contacts, LinearKind
+from trajectory_guard.canny.moment import Moment
 from trajectory_guard.canny.motion import Configuration, Motion, recentred, still, straight
-from trajectory_guard.canny.overlap import Moment, Mover, Overlap, overlaps, pairwise
+from trajectory_guard.canny.overlap import Mover, Overlap, overlaps, pairwise
 from trajectory_guard.canny.polyhedron import ConvexPolyhedron
 
 __all__ = [
+    'Answer',
     'Configuration',
     'Contact',
     'ConvexPolyhedron',
     'FastOverlap',
     'Kind',
+    'LinearKind',
     'Moment',
     'Motion',
     'Mover',
     'Overlap',
     'fast_overlap',
+    'linear_answers',
+    'linear_contacts',
     'overlaps',
     'pairwise',
     'recentred',

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 import functools
 import itertools
 
@@ -13,6 +12,7 @@ from trajectory_guard.canny.constraint import constraint_a, constraint_b, constr
 from trajectory_guard.canny.contact import Contact, contact_point, touching
 from trajectory_guard.canny.fast import fast_overlap
 from trajectory_guard.canny.integers import exponent
+from trajectory_guard.canny.moment import Moment, moment
 from trajectory_guard.canny.motion import Motion, still
 from trajectory_guard.canny.polyhedron import ConvexPolyhedron
 from trajectory_guard.canny.polynomial import to_bernstein
@@ -20,27 +20,6 @@ from trajectory_guard.canny.relative import degree, relative_basis
 from trajectory_guard.canny.root import Root
 from trajectory_guard.canny.signs import place, Signs, Trace, trace
 from trajectory_guard.canny.transitions import any_of, runs
-
-# An end of an overlap is enclosed this closely [powers of two of the path].
-ENCLOSURE = 60
-
-
-@dataclass(frozen=True, slots=True)
-class Moment:
-    """
-    An instant of a path, exact: a number s in [lower, upper].
-
-    :param lower: least value.
-    :param upper: greatest value; the same where s is a dyadic number that is known exactly, else
-        2^-60 more.
-    """
-
-    lower: Fraction
-    upper: Fraction
-
-    def __float__(self) -> float:
-        """Return s within rounding."""
-        return float((self.lower + self.upper) / 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,10 +100,10 @@ def exact_overlaps(
     found = []
     for first, last in runs(any_of(overlap(table) for table in tables)):
         ends = [(first, first > 0), (last - 1, last < cells)]
-        moments = [_moment(roots, cell) for cell, _ in ends]
+        moments = [moment(roots, cell) for cell, _ in ends]
         contacts = [
-            tuple(_contacts(pairs, tables, motions, cell, float(moment))) if inner else ()
-            for (cell, inner), moment in zip(ends, moments, strict=True)
+            tuple(_contacts(pairs, tables, motions, cell, float(when))) if inner else ()
+            for (cell, inner), when in zip(ends, moments, strict=True)
         ]
         found.append(Overlap(moments[0], moments[1], contacts[0], contacts[1]))
     return tuple(found)
@@ -187,15 +166,6 @@ def _table(a: ConvexPolyhedron, b: ConvexPolyhedron, rest: Iterator[Signs]) -> C
     )
     rows = ([[next(rest) for _ in range(n)] for _ in range(m)] for m, n in shapes)
     return Constraints(a, b, *rows)
-
-
-def _moment(roots: Sequence[Root], cell: int) -> Moment:
-    """Return the instant of an even cell."""
-    if cell in (0, 2 * len(roots) + 2):
-        end = Fraction(int(cell > 0))
-        return Moment(end, end)
-    root = roots[cell // 2 - 1].refined(ENCLOSURE)
-    return Moment(*(Fraction(int(x.p), int(x.q)) for x in (root.lower, root.upper)))
 
 
 def _contacts(

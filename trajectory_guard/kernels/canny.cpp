@@ -2,6 +2,7 @@
 // or 2 if the degree is too high.
 #include <new>
 
+#include "linear.hpp"
 #include "meeting.hpp"
 
 using namespace guard;
@@ -24,6 +25,15 @@ int guard_overlap(const Polyhedron* a, const Course* course_a, const Polyhedron*
   }
   *out = {int64_t(meeting.possible.size()), int64_t(meeting.certain.size()), meeting.polynomials,
           meeting.possible.data(), meeting.certain.data()};
+  return 0;
+} catch (const std::bad_alloc&) {
+  return 1;
+}
+
+// Answer queries of four points on straight lines each: rows (count, 8, 3), answers (count,).
+int guard_linear(int64_t count, int64_t kind, const double* rows, int64_t* answers) try {
+  static thread_local LinearQuery query;
+  for (int64_t i = 0; i < count; i++) answers[i] = query.run(kind, rows + 24 * i);
   return 0;
 } catch (const std::bad_alloc&) {
   return 1;

@@ -15,6 +15,10 @@ UNIT = Path(__file__).with_suffix('.cpp')
 CLOSED_FORM = 0  # of cubics; of other degrees by halving and secants
 HALVING = 1
 
+# Answers to queries of four points on straight lines, and their kinds.
+APART, UNDECIDED, MEETING = range(3)
+VERTEX_FACE, EDGE_EDGE = range(2)
+
 _POINTER = ctypes.c_void_p
 _INTEGER = ctypes.c_int64
 
@@ -146,3 +150,21 @@ def kernel_overlap(
 def _rows(spans: Any, count: int) -> list[tuple[float, float]]:
     flat = spans[: 2 * count] if count else []
     return list(zip(flat[::2], flat[1::2], strict=True))
+
+
+def kernel_linear(kind: int, rows: np.ndarray) -> np.ndarray:
+    """
+    Say for each query whether its features meet.
+
+    :param kind: VERTEX_FACE or EDGE_EDGE.
+    :param rows: (n, 8, 3) four points at the start, then at the end, contiguous [m].
+    :returns: (n,) int64, APART, UNDECIDED or MEETING.
+    :raises MemoryError: there is not enough.
+    """
+    answers = np.empty(len(rows), dtype=np.int64)
+    status = load(UNIT).guard_linear(
+        _INTEGER(len(rows)), _INTEGER(kind), _POINTER(address(rows)), _POINTER(address(answers))
+    )
+    if status:
+        raise MemoryError
+    return answers
