@@ -28,6 +28,13 @@ TITLES = {
     'threads': 'A batch on one thread and on two',
     'budget': 'The free trajectory with the most pieces, within a budget of pieces',
     'certificate': 'Certificates',
+    'ccd': 'Queries with linear vertex motion; missed: collisions called free',
+    'figure2': 'An L among obstacles: when it touches what, where (paper: figure 2)',
+    'figure2 time': 'The same: the paper on a Lisp machine, and ours',
+    'pair': 'Two boxes with 12 edges each; degree: of the constraints',
+    'two movers': 'Two movers against one (paper: less than an order of magnitude)',
+    'exact': 'Two boxes in exact arithmetic',
+    'growth of bodies': 'Two bodies of more and more vertices; order: of cost in constraints',
 }
 
 
