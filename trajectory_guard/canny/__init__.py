@@ -9,12 +9,14 @@ s, and overlap a disjunction of conjunctions of signs.
 taken as exact, all answers are proved, ends of overlaps come with enclosures and contacts.
 *Rounded, with bounds*: :func:`fast_overlap`, microseconds a pair; its *possible* spans contain
 every overlap and its *certain* ones nothing else. :func:`linear_contacts` and
-:func:`linear_answers` are the same for four points on straight lines.
+:func:`linear_answers` are the same for four points on straight lines. :func:`along` gives a
+single constraint along a robot link's rational motion.
 
 Quaternions are (q0, q1, q2, q3), scalar first, of any length but 0: the rotation by
 2 atan2(|q|, q0) about q. Lengths are metres. Bodies are closed: touching is overlap.
 """
 
+from trajectory_guard.canny.along import Along, along
 from trajectory_guard.canny.constraint import Kind
 from trajectory_guard.canny.contact import Contact
 from trajectory_guard.canny.fast import fast_overlap, FastOverlap
@@ -25,6 +27,7 @@ from trajectory_guard.canny.overlap import Mover, Overlap, overlaps, pairwise
 from trajectory_guard.canny.polyhedron import ConvexPolyhedron
 
 __all__ = [
+    'Along',
     'Answer',
     'Configuration',
     'Contact',
@@ -36,6 +39,7 @@ __all__ = [
     'Motion',
     'Mover',
     'Overlap',
+    'along',
     'fast_overlap',
     'linear_answers',
     'linear_contacts',

@@ -13,6 +13,10 @@ inequalities in ``separation.hpp`` and ``cull.hpp``; rounding in ``margin.hpp``;
 ``cover.hpp``, ``pair.hpp`` and ``leaf.hpp``; for collisions ``witness.hpp`` and the depths of
 ``deepest.hpp``.  *Untrusted*, may only propose: ``gjk.hpp`` and the search in ``deepest.hpp``.
 
+``canny.cpp`` is a unit of its own, the algebraic collision test.  *Trusted*: ``bernstein.hpp``,
+``signs.hpp``, ``spans.hpp``, ``constraints.hpp``, ``meeting.hpp``, ``linear.hpp``; ``cubic.hpp``
+may only propose.
+
 Shared conventions: ``tau`` runs over [-1, 1] on a piece; a *node* is a movable joint, its frame
 moves with the joint and has the joint axis as z.
 """
