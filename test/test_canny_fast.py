@@ -51,6 +51,86 @@ def call(name, *arguments, returns=ctypes.c_int64):
     return function(*passed)
 
 
+def within(found, exact, error, given=0.0):
+    """Check an enclosure, and that the bound is not many times what was given, plus rounding."""
+    off = [abs(Fraction(x) - y) for x, y in zip(found.tolist(), exact, strict=True)]
+    assert 0 < max(off) <= Fraction(error)
+    assert error <= (20.0 * given + 1e-13) * max(1.0, np.abs(found).max())
+
+
+def off_by(row, error):
+    """Return coefficients that are off by an error, all the same way."""
+    return [Fraction(x) + Fraction(error) for x in np.asarray(row).tolist()]
+
+
+# Without its rounding term, or without what the operands err, a bound would be too small.
+ERRORS = [0.0, 1e-3]
+
+
+@pytest.mark.parametrize('error', ERRORS)
+@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize(('m', 'n'), [(1, 1), (2, 3), (8, 9), (20, 20)])
+def test_products_and_sums(m, n, seed, error):
+    rng = np.random.default_rng(seed)
+    f, g, out = rng.normal(size=m + 1), rng.normal(size=n + 1), np.empty(m + n + 1)
+    bound = call('canny_product', f, m, g, n, error, out, returns=ctypes.c_double)
+    shares = [math.comb(m + n, k) for k in range(m + n + 1)]
+    for signs in itertools.product((1, -1), repeat=2):
+        rows = [off_by(row, sign * error) for row, sign in zip((f, g), signs, strict=True)]
+        exact = [Fraction(0)] * (m + n + 1)
+        for (i, x), (j, y) in itertools.product(*map(enumerate, rows)):
+            exact[i + j] += math.comb(m, i) * math.comb(n, j) * x * y / shares[i + j]
+        within(out, exact, bound, error)
+    h, out = rng.normal(size=m + 1) * 3.0, np.empty(m + 1)
+    bound = call('canny_sum', f, h, m, error, out, returns=ctypes.c_double)
+    rows = off_by(f, error), off_by(h, -error)
+    within(out, [x - y for x, y in zip(*rows, strict=True)], bound, error)
+
+
+def test_what_either_factor_errs_counts():
+    """Constants, where the bound is nearly reached: (1 + e)(8 + e), (8 + e)(1 + e)."""
+    for x, y in ((1.0, 8.0), (8.0, 1.0)):
+        out = np.empty(1)
+        bound = call(
+            'canny_product', np.array([x]), 0, np.array([y]), 0, 0.5, out, returns=ctypes.c_double
+        )
+        assert 8.5 * 1.5 - 8.0 <= bound < 4.76
+
+
+@pytest.mark.parametrize('error', ERRORS)
+@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize('n', [3, 5, 17, 40])
+def test_values_and_parts(n, seed, error):
+    rng = np.random.default_rng(seed)
+    f, out = rng.normal(size=n + 1), np.empty(1)
+    for s in rng.uniform(0.0, 1.0, 8).tolist():
+        bound = call('canny_value', f, n, s, error, out, returns=ctypes.c_double)
+        within(out, [value(off_by(f, error), Fraction(s))], bound, error)
+    for t in (0.5, 7.0 / 16.0):
+        out = np.empty(2 * n + 2)
+        bound = call('canny_split', f, n, t, error, out, returns=ctypes.c_double)
+        row, left, right = off_by(f, error), [], []
+        while row:
+            left.append(row[0])
+            right.insert(0, row[-1])
+            row = [a + (b - a) * Fraction(t) for a, b in itertools.pairwise(row)]
+        within(out, left + right, bound, error)
+
+
+@pytest.mark.parametrize('error', ERRORS)
+@pytest.mark.parametrize('seed', range(3))
+def test_combinations_of_rounded_constants(seed, error):
+    rng = np.random.default_rng(seed)
+    constants = [Fraction(int(x), 3**20) for x in rng.integers(-(3**20), 3**20, 7)]
+    f, out = rng.normal(size=(7, 4)), np.empty(4)
+    rounded = np.array([float(x) for x in constants])
+    bound = call('canny_combination', rounded, 7, f, 3, error, out, returns=ctypes.c_double)
+    # All off in the direction that adds up.
+    rows = [off_by(row, math.copysign(error, x)) for row, x in zip(f, constants, strict=True)]
+    exact = [sum(x * row[k] for x, row in zip(constants, rows, strict=True)) for k in range(4)]
+    within(out, exact, bound, error)
+
+
 def stretches(coefficients, error, method):
     """Return what the kernel says of a polynomial."""
     c = np.array(coefficients, float)
@@ -185,14 +265,14 @@ def test_exact_basis_and_constraints_lie_within_the_errors(which, seed):
         scale = unit / (1 << (k * power))
         return [c * scale / m for c, m in zip(row, binomials, strict=True)]
 
-    def within(found, row, power, error):
+    def check_row(found, row, power, error):
         for x, y in zip(found.tolist(), right(row, power), strict=True):
             assert abs(fmpq(*x.as_integer_ratio()) - y) <= fmpq(*error.as_integer_ratio())
 
     c, errors = np.empty((TERMS, n + 1)), np.empty(TERMS)
     assert call('canny_basis', course(a), course(b), c, errors) == n
     for found, row, power, error in zip(c, exact, lengths, errors.tolist(), strict=True):
-        within(found, row, power, error)
+        check_row(found, row, power, error)
         assert error <= 1e-12 * max(1.0, np.abs(found).max())
     of_a, of_b = features(body_a, k), features(body_b, k)
     structures = _structure(body_a), course(a), _structure(body_b), course(b)
@@ -207,7 +287,7 @@ def test_exact_basis_and_constraints_lie_within_the_errors(which, seed):
         ]
         found = np.empty(n + 1)
         error = call('canny_constraint', *structures, kind, i, j, found, returns=ctypes.c_double)
-        within(found, row, 3, error)
+        check_row(found, row, 3, error)
 
 
 def check(a, motion_a, b, motion_b):
