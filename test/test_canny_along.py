@@ -9,7 +9,7 @@ from canny_judge import bezier, cross, dot, minus, rotated
 import numpy as np
 import pytest
 
-from trajectory_guard.canny.along import along
+from trajectory_guard.canny.along import _moved, _Scaled, _weight, along
 from trajectory_guard.canny.constraint import Kind
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.joint_path import joint_path
@@ -129,6 +129,69 @@ def test_a_motion_with_an_error_has_one_that_covers_it(kind):
         assert off <= Fraction(found.error)
         largest = max(largest, float(off) / found.error)
     assert largest > 0.02  # a bound far from every case would hide a wrong unit
+
+
+@pytest.mark.parametrize('kind', [Kind.A, Kind.C])
+@pytest.mark.parametrize('far', [0.0, 20.0])
+def test_both_parts_of_the_error_are_needed(kind, far):
+    """A small turn seen from far away; a small shift where the features touch."""
+    e, angle = 0.01, Fraction(1, 256)
+    corners = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    of_a = corners if kind == Kind.A else corners[:2]
+    place = corners[0] + [far, 0.0, 0.0]
+    of_b = place if kind == Kind.A else np.array([place, place + [0.0, 1.0, 0.0]])
+    still = np.eye(3, 4)[None]
+    found = along(RationalMotion(still, np.ones(1), e, 0.0, 0.0), kind, of_a, of_b)
+    largest = 0.0
+    for axis in np.eye(3, dtype=int).tolist():
+        if far:
+            # tan(angle / 2) = 1 / 256: points at a distance of 1 move by less than 2 / 256 < e.
+            turn = [Fraction(1), *(angle * x for x in axis)]
+
+            def moved(p, turn=turn):
+                return rotated([Fraction(x) for x in p], turn)
+        else:
+
+            def moved(p, axis=axis):
+                return [Fraction(x) + Fraction(e) * y for x, y in zip(p, axis, strict=True)]
+
+        value = exact_value(kind, moved, of_a, of_b)
+        off = abs(Fraction(found.coefficients[0]) - value)
+        assert off <= Fraction(found.error)
+        largest = max(largest, float(off) / found.error)
+    assert largest > 0.15
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_rounding_is_carried_along(seed):
+    """Products, sums and moved points against exact ones, of operands that err or not."""
+    rng = np.random.default_rng(seed)
+    for error in (0.0, 1e-3):
+        f, g = (_Scaled(rng.normal(size=n), np.full(n, error)) for n in (4, 7))
+        x, y = ([Fraction(c) + Fraction(error) for c in one.c.tolist()] for one in (f, g))
+        product = [Fraction(0)] * 10
+        for (i, a), (j, b) in itertools.product(enumerate(x), enumerate(y)):
+            product[i + j] += a * b
+        check_scaled(f * g, product)
+        h = _Scaled(rng.normal(size=4) * 3, np.full(4, error))
+        z = [Fraction(c) + Fraction(error) for c in h.c.tolist()]
+        check_scaled(f + h, [a + b for a, b in zip(x, z, strict=True)])
+        opposite = [Fraction(c) - Fraction(error) for c in h.c.tolist()]
+        check_scaled(f - h, [a - b for a, b in zip(x, opposite, strict=True)])
+    motion = RationalMotion(rng.normal(size=(5, 3, 4)), rng.uniform(1, 2, 5), 0.0, 0.0, 0.0)
+    point = rng.normal(size=3)
+    ends = [Fraction(c) for c in [*point.tolist(), 1.0]]
+    for r, one in enumerate(_moved(motion, _weight(motion), point)):
+        rows = [[Fraction(c) for c in row] for row in motion.control_points[:, r].tolist()]
+        weights = [Fraction(w) for w in motion.weights.tolist()]
+        check_scaled(one, [w * dot(row, ends) for w, row in zip(weights, rows, strict=True)])
+
+
+def check_scaled(found, exact):
+    """Check every coefficient; rounding alone makes some differ."""
+    off = [abs(Fraction(c) - x) for c, x in zip(found.c.tolist(), exact, strict=True)]
+    assert max(off) > 0
+    assert all(o <= Fraction(e) for o, e in zip(off, found.error.tolist(), strict=True))
 
 
 @pytest.mark.parametrize('kind', KINDS)
