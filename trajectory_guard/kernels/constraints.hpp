@@ -8,8 +8,10 @@
 // positive for a vertex above a plane, and for an edge that leaves a face on the inner side of an
 // edge that bounds it counter-clockwise.
 //
-// **Error.** A value is sum_i a_i f_i with at most 7 terms; the a_i are rounded once, the products
-// and sums 7 times: |error| <= sum_i |a_i| (e_i + 8 u |f_i|) (1 + u).
+// **Error.** A value is sum_i a_i f_i with at most 7 terms; the a_i are rounded once, by u |a_i| or
+// 2^-1075, the products and sums 7 times:
+//
+//     |error| <= sum_i |a_i| (e_i + 8 u |f_i|) (1 + u) + 2^-1074 (e_i + |f_i|).
 #pragma once
 
 #include <cstdint>
@@ -113,6 +115,7 @@ inline bool relative_basis(const Course& a, const Course& b, Polynomial* basis) 
 }
 
 constexpr double COMBINED = 8.0;
+constexpr double TINIEST = 0x1p-1074;
 
 // Polynomials of one degree, end to end, with errors and sizes.
 class Rows {
@@ -148,7 +151,7 @@ class Combination {
 
   void add(double a, const double* c, double error, double size) {
     for (int k = 0; k <= f.degree; k++) f.c[k] += a * c[k];
-    f.error += std::fabs(a) * (error + COMBINED * UNIT_ROUNDOFF * size);
+    f.error += std::fabs(a) * (error + COMBINED * UNIT_ROUNDOFF * size) + TINIEST * (error + size);
   }
 
   void add(double a, const Rows& rows, size_t i) {
