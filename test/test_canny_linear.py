@@ -66,8 +66,8 @@ def check(kind, rows):
 def test_small_integers_are_full_of_degenerate_cases(kind):
     """Collinear, coplanar, coincident: about a fifth touch."""
     rng = np.random.default_rng(int(kind))
-    found = [check(kind, rng.integers(-1, 2, (8, 3))) for _ in range(150)]
-    assert 15 < sum(bool(spans) for spans, _ in found) < 135
+    found = [check(kind, rng.integers(-1, 2, (8, 3))) for _ in range(100)]
+    assert 10 < sum(bool(spans) for spans, _ in found) < 90
     assert any(a.upper < b.lower for spans, _ in found for a, b in spans)
 
 
@@ -76,7 +76,7 @@ def test_small_integers_are_full_of_degenerate_cases(kind):
 def test_random_queries(kind, scale):
     """In general position nothing stays undecided."""
     rng = np.random.default_rng(5)
-    rows = [scale * rng.normal(size=(8, 3)) for _ in range(60)]
+    rows = [scale * rng.normal(size=(8, 3)) for _ in range(30)]
     answers = [check(kind, one) for one in rows]
     for spans, answer in answers:
         assert answer == (Answer.MEETING if spans else Answer.APART)
