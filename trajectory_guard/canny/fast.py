@@ -30,7 +30,7 @@ class FastOverlap(NamedTuple):
     What is known about the overlap of two convex polyhedra on a path.
 
     :param possible: disjoint closed spans of s, in order; every instant at which the closed bodies
-        have a point in common lies in one. None: the bodies are certainly apart on the whole path.
+        have a point in common lies in one. Empty: they are certainly apart on the whole path.
     :param certain: the same, but at every instant of them they certainly overlap. Around the
         instants where other features take over there may be gaps of some 1e-15.
     """

@@ -94,19 +94,21 @@ class Isolation {
       put(a, b, POSITIVE);
     } else if (high < -f.error) {
       put(a, b, NEGATIVE);
-    } else if (count(f, a, b)) {
-    } else if (bits + SKEW_BITS > DEEPEST || f.degree == 0) {
-      put(a, b, UNKNOWN);
-    } else {
-      // A root in the very middle would stay at an end of both halves.
-      bool clear = certain(value(f, 0.5), f.error) != 0;
-      double t = clear ? 0.5 : SKEW, middle = a + t * (b - a);  // exact: multiples of 2^-DEEPEST
-      bits += clear ? 1 : SKEW_BITS;
-      Polynomial left, right;
-      split(f, t, left, right);
-      search(left, a, middle, bits);
-      search(right, middle, b, bits);
+    } else if (!count(f, a, b)) {
+      halve(f, a, b, bits);
     }
+  }
+
+  void halve(const Polynomial& f, double a, double b, int bits) {
+    if (bits + SKEW_BITS > DEEPEST || f.degree == 0) return put(a, b, UNKNOWN);
+    // A root in the very middle would stay at an end of both halves.
+    bool clear = certain(value(f, 0.5), f.error) != 0;
+    double t = clear ? 0.5 : SKEW, middle = a + t * (b - a);  // exact: multiples of 2^-DEEPEST
+    bits += clear ? 1 : SKEW_BITS;
+    Polynomial left, right;
+    split(f, t, left, right);
+    search(left, a, middle, bits);
+    search(right, middle, b, bits);
   }
 
   // Decide [a, b] by points around the roots, if the count of the changes lets it.
