@@ -95,7 +95,12 @@ inline Polynomial elevated(const Polynomial& f, int degree) {
 
 // f at s in [0, 1], and what bounds its error.
 inline double value(const Polynomial& f, double s) {
-  double b[LARGEST_DEGREE + 1], r = 1.0 - s;
+  double r = 1.0 - s;
+  if (f.degree == 3) {  // the same without loops: cubics are asked for most
+    double x = r * f.c[0] + s * f.c[1], y = r * f.c[1] + s * f.c[2], z = r * f.c[2] + s * f.c[3];
+    return r * (r * x + s * y) + s * (r * y + s * z);
+  }
+  double b[LARGEST_DEGREE + 1];
   for (int k = 0; k <= f.degree; k++) b[k] = f.c[k];
   for (int top = f.degree; top > 0; top--)
     for (int k = 0; k < top; k++) b[k] = r * b[k] + s * b[k + 1];
