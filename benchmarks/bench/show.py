@@ -32,6 +32,13 @@ TITLES = {
     'squares': 'Two squares of n x n squares [Schroecker & Weber 2014, tables 1 and 2]',
     'scaling': 'Exponents of growth in the number of pairs of polygons (1: linear)',
     'which': 'Tests by moving square, plain listing [Schroecker & Weber 2014, figures 5 and 6]',
+    'ccd': 'Queries with linear vertex motion; missed: collisions called free',
+    'figure2': 'An L among obstacles: when it touches what, where (paper: figure 2)',
+    'figure2 time': 'The same: the paper on a Lisp machine, and ours',
+    'pair': 'Two boxes with 12 edges each; degree: of the constraints',
+    'two movers': 'Two movers against one (paper: less than an order of magnitude)',
+    'exact': 'Two boxes in exact arithmetic',
+    'growth of bodies': 'Two bodies of more and more vertices; order: of cost in constraints',
 }
 
 

@@ -19,6 +19,10 @@ A unit of its own, ``ball.cpp``, covers free rational motions of polyhedra by ba
 ``ball_cover.hpp``, ``ball.hpp``, ``cluster.hpp``, ``fat_polygon.hpp`` and ``quadratic.hpp`` are
 trusted, but for the guess whether two polygons cross.
 
+``canny.cpp`` is a unit of its own, the algebraic collision test.  *Trusted*: ``bernstein.hpp``,
+``signs.hpp``, ``spans.hpp``, ``constraints.hpp``, ``meeting.hpp``, ``linear.hpp``; ``cubic.hpp``
+may only propose.
+
 Shared conventions: ``tau`` runs over [-1, 1] on a piece; a *node* is a movable joint, its frame
 moves with the joint and has the joint axis as z.
 """
