@@ -3,6 +3,7 @@
 from fractions import Fraction
 import itertools
 import math
+from types import SimpleNamespace
 
 from bench_data import cases, workcell
 from canny_judge import bezier, cross, dot, minus, rotated
@@ -13,7 +14,8 @@ from trajectory_guard.canny.along import _moved, _Scaled, _weight, along
 from trajectory_guard.canny.constraint import Kind
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.joint_path import joint_path
-from trajectory_guard.motion import Builder, rational_motion, RationalMotion
+from trajectory_guard.link_motion import Builder, rational_motion
+from trajectory_guard.motion import RationalMotion
 
 KINDS = list(Kind)
 SAMPLES = [Fraction(i, 12) for i in range(13)]
@@ -30,7 +32,7 @@ class Screw:
         self.weights, rows = self.fitted(n)
         controls = [[float(c / w) for c in row] for row, w in zip(rows, self.weights, strict=True)]
         # Both are rounded once: relative errors of 2^-53 on coordinates of a few metres.
-        weights = np.array([float(w) for w in self.weights])
+        weights = np.array([float(w / math.comb(n, i)) for i, w in enumerate(self.weights)])
         poses = np.array(controls).reshape(-1, 3, 4)
         self.motion = RationalMotion(poses, weights, 1e-13, 0.0, 0.0)
 
@@ -101,7 +103,9 @@ def test_exact_value_lies_within_the_error(kind, seed):
     exact_weights = [Fraction(w) for w in screw.motion.weights.tolist()]
     n = len(exact_weights) - 1
     for s in SAMPLES:
-        w = sum(c * s**i * (1 - s) ** (n - i) for i, c in enumerate(exact_weights))
+        w = sum(
+            math.comb(n, i) * c * s**i * (1 - s) ** (n - i) for i, c in enumerate(exact_weights)
+        )
         value = exact_value(kind, lambda p, s=s: screw.moved(p, s), of_a, of_b)
         assert abs(polynomial(found.coefficients, s) - w * value) <= Fraction(found.error)
 
@@ -183,7 +187,7 @@ def test_rounding_is_carried_along(seed):
     ends = [Fraction(c) for c in [*point.tolist(), 1.0]]
     for r, one in enumerate(_moved(motion, _weight(motion), point)):
         rows = [[Fraction(c) for c in row] for row in motion.control_points[:, r].tolist()]
-        weights = [Fraction(w) for w in motion.weights.tolist()]
+        weights = [math.comb(4, i) * Fraction(w) for i, w in enumerate(motion.weights.tolist())]
         check_scaled(one, [w * dot(row, ends) for w, row in zip(weights, rows, strict=True)])
 
 
@@ -219,7 +223,7 @@ def test_on_real_robots_both_builders_agree(kind, robot):
     for s in SAMPLES:
         spans = []
         for motion, one in found.values():
-            w = float(polynomial(motion.weights / binomials(len(motion.weights) - 1), s))
+            w = float(polynomial(motion.weights, s))
             value = float(polynomial(one.coefficients, s))
             spans.append(((value - one.error) / w - 1e-12, (value + one.error) / w + 1e-12))
         (a, b), (c, d) = spans
@@ -227,11 +231,6 @@ def test_on_real_robots_both_builders_agree(kind, robot):
     # Little beyond what the motion itself errs.
     size = np.abs(result.coefficients).max()
     assert result.error <= 100 * rational.error * rational.weights.max() + 1e-9 * size
-
-
-def binomials(n):
-    """Return C(n, i)."""
-    return np.array([math.comb(n, i) for i in range(n + 1)], float)
 
 
 @pytest.mark.parametrize(
@@ -255,5 +254,7 @@ def test_nonsense_has_no_bound(kind):
     """A motion that is not a number certifies nothing."""
     rng = np.random.default_rng(0)
     good = Screw(rng).motion
-    bad = RationalMotion(good.control_points * math.nan, good.weights, 0.0, 0.0, 0.0)
+    bad = SimpleNamespace(
+        control_points=good.control_points * math.nan, weights=good.weights, error=0.0
+    )
     assert along(bad, kind, *random_features(rng, kind)).error == math.inf

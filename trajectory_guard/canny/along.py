@@ -1,11 +1,11 @@
 r"""
 Constraints along a rational motion, as Bernstein polynomials with a bound on their error.
 
-A rational motion g~ = (L, t) has control points C_i and scaled weights w_i > 0; the image of a
-point times the weight, w x~ = sum_i w_i C_i(x) s^i (1 - s)^(n - i), is a polynomial of degree n.
-The *true* motion g is rigid and |g(x) - g~(x)| <= e for the points x of the body. With three
-corners of a face (c0 c1 c2, counter-clockwise from outside, c0 c1 c2 not collinear), all types are
-one triple product of points that are moved or stand:
+A rational motion g~ = (L, t) has control points C_i and weights; w_i > 0 are these times C(n, i).
+The image of a point times the weight, w x~ = sum_i w_i C_i(x) s^i (1 - s)^(n - i), is a polynomial
+of degree n. The *true* motion g is rigid and |g(x) - g~(x)| <= e for the points x of the body.
+With three corners of a face (c0 c1 c2, counter-clockwise from outside, c0 c1 c2 not collinear), all
+types are one triple product of points that are moved or stand:
 
     A:  (g c1 - g c0) x (g c2 - g c0) . (p_B - g c0)         positive: p_B outside of A's face
     B:  (c1 - c0) x (c2 - c0) . (g p_A - c0)                  positive: p_A outside of B's face
@@ -33,7 +33,7 @@ that with g~ by at most
     B:  |a| |b| e,
     C:  |h_B - t_B| (2 e D + |h_A - t_A| e),
 
-because x' x y' - x x y = (x' - x) x y' + x x (y' - y). Times w, this is at most max w_i / C(n, i)
+because x' x y' - x x y = (x' - x) x y' + x x (y' - y). Times w, this is at most the largest weight
 times it. Rounding is carried along with every coefficient: a sum or product of doubles errs by
 2^-53 of its result, a convolution with k terms by (k + 1) 2^-53 of that of the absolute values.
 """
@@ -151,14 +151,17 @@ _SHAPES = {Kind.A: ((3, 3), (3,)), Kind.B: ((3,), (3, 3)), Kind.C: ((2, 3), (2, 
 
 
 def _weight(motion: RationalMotion) -> _Scaled:
-    return _Scaled(motion.weights, np.zeros(len(motion.weights)))
+    """Return the scaled weights: a binomial, from 57 on rounded, and a product."""
+    scaled = motion.weights * _binomials(len(motion.weights) - 1)
+    return _Scaled(scaled, 2.0 * U * np.abs(scaled) * UP + UNDERFLOW_PAID)
 
 
 def _moved(motion: RationalMotion, weight: _Scaled, x: np.ndarray) -> _Point:
     """Return w times the image of a point: sums of four products with the weight, 6 roundings."""
     products = motion.control_points * np.array([*x, 1.0])
     scaled = weight.c[:, None] * products.sum(axis=2)
-    error = 6.0 * U * weight.c[:, None] * np.abs(products).sum(axis=2) * UP + UNDERFLOW_PAID
+    size = np.abs(products).sum(axis=2)
+    error = (6.0 * U * weight.c + weight.error)[:, None] * size * UP + UNDERFLOW_PAID
     return [_Scaled(scaled[:, r], error[:, r]) for r in range(3)]
 
 
@@ -207,7 +210,7 @@ def _divided(motion: RationalMotion, whole: _Scaled, divisor: _Scaled, slack: fl
         smallest = raised.c - raised.error
         off = float(((np.abs(rest.c) + rest.error) / smallest).max())
         off = off if smallest.min() > 0.0 else math.inf
-    heaviest = float((motion.weights / binomials).max())
+    heaviest = float(motion.weights.max())
     coefficients = scaled / binomials
     # Dividing by a binomial is one more rounding.
     error = (off + slack * heaviest + 2.0 * U * float(np.abs(coefficients).max())) * UP
