@@ -4,8 +4,8 @@ Constraints along a rational motion, as Bernstein polynomials with a bound on th
 A rational motion g~ = (L, t) has control points C_i and weights; w_i > 0 are these times C(n, i).
 The image of a point times the weight, w x~ = sum_i w_i C_i(x) s^i (1 - s)^(n - i), is a polynomial
 of degree n. The *true* motion g is rigid and |g(x) - g~(x)| <= e for the points x of the body.
-With three corners of a face (c0 c1 c2, counter-clockwise from outside, not collinear), all types are
-one triple product of points that are moved or stand:
+With three corners of a face (c0 c1 c2, counter-clockwise from outside, not collinear), all types
+are one triple product of points that are moved or stand:
 
     A:  (g c1 - g c0) x (g c2 - g c0) . (p_B - g c0)         positive: p_B outside of A's face
     B:  (c1 - c0) x (c2 - c0) . (g p_A - c0)                  positive: p_A outside of B's face
