@@ -11,6 +11,7 @@ from trajectory_guard.errors import Reason, TrajectoryGuardError
 from trajectory_guard.kernels.compiled import COMPILING, is_cold
 from trajectory_guard.result import Verdict
 from trajectory_guard.scene import Obstacle, Scene
+from trajectory_guard.settings import Cover, Settings
 from trajectory_guard.trajectory import Point, Trajectory
 from trajectory_guard.urdf import robot_from_urdf
 from trajectory_guard.workcell import Workcell
@@ -24,16 +25,17 @@ _ROBOT = """
 """
 
 
-def warm_up() -> None:
+def warm_up(cover: Cover = Cover.HULL) -> None:
     """
     Certify a tiny motion, by the same path as every other.
 
+    :param cover: the cover that will be asked for; each has kernels of its own.
     :raises TrajectoryGuardError: the answer is not the known one, so none can be trusted.
     """
     ball = ConvexBody(vertices=np.array([[0.0, 0.0, 2.0]]), ball=0.5)
     workcell = Workcell(robot_from_urdf(_ROBOT), Scene((Obstacle('ball', (ball,)),), digest=''))
     turn = Trajectory.from_points(['elbow'], [Point(0, [0.0]), Point(1, [1.0])])
-    result = judge(workcell, turn)
+    result = judge(workcell, turn, settings=Settings(cover=cover))
     if result.verdict != Verdict.FREE:
         raise TrajectoryGuardError(
             Reason.INTERNAL_ERROR,
@@ -46,7 +48,8 @@ def main() -> None:
     if is_cold():
         print(f'{COMPILING} ...', file=sys.stderr, flush=True)
     begin = time.perf_counter()
-    warm_up()
+    for cover in Cover:
+        warm_up(cover)
     print(f'kernels ready after {time.perf_counter() - begin:.1f} s', file=sys.stderr)
 
 

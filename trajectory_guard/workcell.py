@@ -187,7 +187,9 @@ class Workcell:
         still = np.flatnonzero(~body_moved)
         moving_links = {self.link_names[b] for b in moving}
         still_links = sorted({self.link_names[b] for b in still})
-        unchecked = ['links of the robot against each other']
+        unchecked = []
+        if len(set(self.link_names)) > 1:
+            unchecked.append('links of the robot against each other')
         unchecked += [f'{link} against the scene: no joint moves it' for link in still_links]
         return Pairs(
             moving=moving,

@@ -45,7 +45,7 @@ def answers(request: Request) -> Iterator[Result]:
     _check_names(robot, request.start)
     workcell = Workcell(robot, load_scene(request.scenes, _matrix(request.scene_pose)))
     # Else the first answer's time would be that of loading or compiling the kernels.
-    warm_up()
+    warm_up(request.settings.cover)
     selection = Selection(request.topics, request.joint_state_topics)
     found = (s for path in request.paths for s in sources(path, selection, request.bags_only))
     if request.certificate is None:
@@ -87,7 +87,7 @@ def _answer(source: Source, workcell: Workcell, request: Request) -> Result:
         elif depends_on_duration(source.trajectory, start):
             warnings.append(APPROACH_UNKNOWN)
             start = without(start, source.trajectory.joint_names)
-    if request.self_collision:
+    if request.self_collision and len(workcell.robot.collision_links) > 1:
         warnings.append(SELF_COLLISION_WARNING)
     result = judge(workcell, source.trajectory, start, request.settings)
     return dataclasses.replace(result, warnings=(*result.warnings, *warnings))

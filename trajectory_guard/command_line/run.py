@@ -77,16 +77,21 @@ def _guarded(work: Callable[[], ExitCode]) -> ExitCode:
 def _run(request: Request, json: bool) -> ExitCode:
     """Print the results and return the exit code."""
     from trajectory_guard.command_line.answer import answers
+    from trajectory_guard.kernels.ball import UNIT as BALL_UNIT
     from trajectory_guard.kernels.compiled import COMPILING, is_cold
+    from trajectory_guard.settings import Cover
 
-    if request.self_collision:
-        _say(f'note: {SELF_COLLISION_WARNING}')
-    if is_cold():
+    balls = request.settings.cover is Cover.BALL
+    if is_cold() or (balls and is_cold(BALL_UNIT)):
         _say(f'note: {COMPILING}')
     output = _output(json)
     code = ExitCode.ALL_FREE
     judged = rejected = 0
+    told = False
     for result in answers(request):
+        if SELF_COLLISION_WARNING in result.warnings and not told:
+            told = True
+            _say(f'note: {SELF_COLLISION_WARNING}')
         output.show(result)
         code = max(code, exit_code(result))
         judged += 1

@@ -43,9 +43,9 @@ class KernelError(RuntimeError):
     """The kernels cannot be compiled or loaded on this machine."""
 
 
-def is_cold() -> bool:
-    """Say whether the kernels have yet to be compiled on this machine."""
-    return not _path(UNIT).is_file()
+def is_cold(unit: Path = UNIT) -> bool:
+    """Say whether a unit of the kernels has yet to be compiled on this machine."""
+    return not _path(unit).is_file()
 
 
 def library() -> ctypes.CDLL:

@@ -77,7 +77,7 @@ class Guard(Node):
             robot.digest()
         self._model = self._model_of(robot)
         self.get_logger().info('warming up (the first start compiles the kernels)')
-        warm_up()
+        warm_up(configuration.settings.cover)
 
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._apply_parameters)
