@@ -193,7 +193,8 @@ def _header(value: Any) -> SimpleNamespace:
     if not isinstance(value, dict) or 'stamp' not in value:
         raise _unreadable(f'header: expected a mapping with stamp, found {shown(value)}')
     _refuse_unknown(value, {'stamp', 'frame_id'}, 'header')
-    return SimpleNamespace(stamp=_time(value['stamp'], 'header.stamp'))
+    (frame_id,) = _strings([value.get('frame_id', '')], 'header.frame_id')
+    return SimpleNamespace(stamp=_time(value['stamp'], 'header.stamp'), frame_id=frame_id)
 
 
 def _point(value: Any, field: str) -> SimpleNamespace:

@@ -57,9 +57,10 @@ def multi_dof_from_message(message: Any, name: str = '') -> MultiDofTrajectory:
     """
     Return the poses in time that a MultiDOFJointTrajectory message describes.
 
-    The header is not read; see :func:`stamp_from_message`.
+    Of the header the frame is read; for the stamp see :func:`stamp_from_message`.
 
-    :param message: anything with the fields of trajectory_msgs/MultiDOFJointTrajectory.
+    :param message: anything with the fields of trajectory_msgs/MultiDOFJointTrajectory; the header
+        may be missing.
     :param name: label of the trajectory in the result.
     :raises TrajectoryError: a field is missing, or the trajectory is not one that can be played.
     """
@@ -75,7 +76,8 @@ def multi_dof_from_message(message: Any, name: str = '') -> MultiDofTrajectory:
             )
         )
     joint_names = tuple(_field(message, 'joint_names', 'the trajectory'))
-    return MultiDofTrajectory.from_points(joint_names, points, name=name)
+    frame_id = getattr(getattr(message, 'header', None), 'frame_id', '')
+    return MultiDofTrajectory.from_points(joint_names, points, name=name, frame_id=str(frame_id))
 
 
 _TWIST = (('linear', 'xyz'), ('angular', 'xyz'))

@@ -233,3 +233,24 @@ def test_no_point_of_a_deformed_ball_is_inside_while_free() -> None:
                     images = surface @ pose[:, :3].T + pose[:, 3]
                     assert not (np.abs(images) < half - 1e-9).all(axis=1).any()
     assert found > 5
+
+
+def test_time_before_the_first_knot_is_nobodys_but_unknown() -> None:
+    """A path that begins late is suspect until then, and cannot be told otherwise."""
+    motion = straight(np.array([5.0, 0.0, 0.0]), np.array([6.0, 0.0, 0.0]))
+    late = FreePath.exact([motion], [5 * SECOND, 6 * SECOND])
+    result = certify(cell(Sphere(0.1), Box((0.2, 0.2, 0.2))), late)
+    assert [(row.start_ns, row.status) for row in result.intervals] == [
+        (0, Status.SUSPECT),
+        (5 * SECOND, Status.FREE),
+    ]
+    with pytest.raises(TrajectoryGuardError, match='unknown_until_ns is 0'):
+        FreePath(
+            'part',
+            np.array([5, 6]),
+            (motion,),
+            np.zeros(1),
+            np.zeros(1),
+            'given',
+            unknown_until_ns=0,
+        )

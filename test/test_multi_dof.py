@@ -24,6 +24,7 @@ from trajectory_guard.primitive import Box
 from trajectory_guard.result import Status, Verdict
 from trajectory_guard.scene import Obstacle, Scene
 from trajectory_guard.settings import Settings
+from trajectory_guard.urdf import robot_from_urdf
 from trajectory_guard.workcell import Workcell
 
 SECOND = 10**9
@@ -197,8 +198,9 @@ def test_the_digest_is_of_what_shapes_the_path() -> None:
         trajectory(point(0, (1, 2, 3)), point(SECOND + 1)),
         trajectory(point(0, (1, 2, 3)), point(SECOND, velocity=[0.0] * 6)),
         trajectory(*base, name='other'),
+        MultiDofTrajectory.from_points(('base',), base, frame_id='odom'),
     ]
-    assert len({same, *(other.digest() for other in others)}) == 5
+    assert len({same, *(other.digest() for other in others)}) == 6
 
 
 def work(at=(0.0, 0.0, 0.0)) -> Workcell:
@@ -282,7 +284,7 @@ def plain(value: object) -> object:
 def test_messages_and_their_text_say_the_same(derivatives: int) -> None:
     points = random_points(np.random.default_rng(3), derivatives)
     told = message(points)
-    wanted = trajectory(*points).digest()
+    wanted = MultiDofTrajectory.from_points(('base',), points, frame_id='map').digest()
     assert multi_dof_from_message(told).digest() == wanted
     (document,) = documents(json.dumps(plain(told)), 'poses.json')
     assert isinstance(document.trajectory, MultiDofTrajectory)
@@ -392,3 +394,21 @@ def test_a_joint_trajectory_is_no_motion_of_a_free_body(tmp_path: Path) -> None:
     run = CliRunner().invoke(app, ['check', *given, str(tmp_path / 'joints.json')])
     assert run.exit_code == 2
     assert "no joint 'base'" in run.output
+
+
+@pytest.mark.parametrize(
+    ('frame_id', 'verdict'),
+    [('', 'free'), ('map', 'free'), ('/map', 'free'), ('odom', 'rejected'), ('cart', 'rejected')],
+)
+def test_poses_in_another_frame_are_refused_by_name(frame_id: str, verdict: str) -> None:
+    robot = robot_from_urdf(CART)
+    scene = Scene((Obstacle('box', (Box((0.2, 0.2, 0.2)).load().body,)),), '')
+    told = message([point(0, (3, 0, 0)), point(SECOND, (4, 0, 0))])
+    told.header.frame_id = frame_id
+    result = judge(Workcell(robot, scene), multi_dof_from_message(told))
+    assert result.verdict.name.lower() == verdict
+    if verdict == 'rejected':
+        assert result.reason_code == 'frame_unknown'
+        assert repr(frame_id) in result.message
+    (document,) = documents(json.dumps(plain(told)))
+    assert document.trajectory.frame_id == frame_id

@@ -182,7 +182,7 @@ def _poses_path(
         raise RequestError(
             Reason.INVALID_PARAMETER, 'certificates are written of joint trajectories only'
         )
-    joint = floating_joint_in(workcell.robot, trajectory.joint_names)
+    joint = floating_joint_in(workcell.robot, trajectory.joint_names, trajectory.frame_id)
     free = multi_dof_path(
         trajectory, joint, allow_nonzero_end_velocity=settings.allow_nonzero_end_velocity
     )

@@ -9,7 +9,7 @@ from trajectory_guard.errors import Reason, TrajectoryError
 from trajectory_guard.free_path import FreePath
 from trajectory_guard.joint_path import JointPath
 from trajectory_guard.mimic import follow, followers
-from trajectory_guard.robot import FLOATING_TYPES, Joint, Robot
+from trajectory_guard.robot import FLOATING_TYPES, Joint, JointType, Robot
 from trajectory_guard.trajectory import JointState
 
 # A floating joint of this name is a bare body's: a message may call it what it wants.
@@ -45,14 +45,18 @@ def floating_path(robot: Robot, free: FreePath, start: JointState | None = None)
     )
 
 
-def floating_joint_in(robot: Robot, names: Sequence[str]) -> int:
+def floating_joint_in(robot: Robot, names: Sequence[str], frame_id: str = '') -> int:
     """
     Return which of a message's joints is the robot's floating one: it must be the only one.
 
+    Poses are those of the joint: its child link in the joint's own frame, which hangs on the
+    parent link; so the message's frame is the parent link. A bare body has none.
+
     :param robot: the robot.
     :param names: the message's.
-    :raises TrajectoryError: the robot has no floating joint, or one of another name; or the
-        message names more than that.
+    :param frame_id: the message's frame; '' if it does not say.
+    :raises TrajectoryError: the robot has no floating joint, or one of another name or in another
+        frame; or the message names more than that.
     """
     own = robot.floating
     told = ', '.join(map(repr, names))
@@ -65,6 +69,12 @@ def floating_joint_in(robot: Robot, names: Sequence[str]) -> int:
         only = 'one body' if own == ANY_NAME else f'the floating joint {own!r}'
         raise TrajectoryError(
             Reason.UNKNOWN_JOINT, f'poses of {only} are expected, the message has {told}'
+        )
+    (parent,) = (j.parent for j in robot.joints if j.type is JointType.TRANSLATION)
+    if own != ANY_NAME and frame_id.removeprefix('/') not in ('', parent):
+        raise TrajectoryError(
+            Reason.FRAME_UNKNOWN,
+            f'frame_id is {frame_id!r}; joint {own!r} has its poses in {parent!r}',
         )
     return 0
 

@@ -28,7 +28,7 @@ class FreePath:
     :param turn_error: (S,) [rad].
     :param shift_error: (S,) [m].
     :param interpolation: the rule that made the curve from its data.
-    :param unknown_until_ns: before this time no start pose tells where the body is [ns].
+    :param unknown_until_ns: the first knot; before it nothing tells where the body is [ns].
     :raises RequestError: naming the field, for another shape, knots that do not rise, errors that
         are negative or not finite.
     """
@@ -84,7 +84,8 @@ class FreePath:
         rises = knots[1:] >= knots[:-1] if still else knots[1:] > knots[:-1]
         if not rises.all() or knots[0] < 0:
             raise RequestError(Reason.UNSORTED_TIMES, f'knots_ns must rise from 0, got {knots}')
-        if self.unknown_until_ns not in (0, int(knots[0])):
+        # Else the time before the first knot would be nobody's.
+        if self.unknown_until_ns != int(knots[0]):
             raise RequestError(
                 Reason.INVALID_PARAMETER,
                 f'unknown_until_ns is {self.unknown_until_ns}, the first knot {knots[0]}',
@@ -102,7 +103,16 @@ class FreePath:
         :param joint_name: the floating joint, or the body.
         """
         zero = np.zeros(len(motions))
-        return cls(joint_name, np.array(knots_ns), tuple(motions), zero, zero, 'control points')
+        knots = np.array(knots_ns)
+        return cls(
+            joint_name,
+            knots,
+            tuple(motions),
+            zero,
+            zero,
+            'control points',
+            unknown_until_ns=int(knots[0]),
+        )
 
     @property
     def duration_ns(self) -> int:

@@ -55,6 +55,7 @@ class MultiDofTrajectory:
     :param accelerations: (P, J, 6) [m/s^2, rad/s^2].
     :param has_accelerations: (P,) bool.
     :param name: label for reports.
+    :param frame_id: the frame that all of it is in, '' if the message does not say.
     :raises TrajectoryError: naming the point, the joint and the value.
     """
 
@@ -67,10 +68,15 @@ class MultiDofTrajectory:
     accelerations: np.ndarray
     has_accelerations: np.ndarray
     name: str = ''
+    frame_id: str = ''
 
     @classmethod
     def from_points(
-        cls, joint_names: Sequence[str], points: Sequence[PosePoint], name: str = ''
+        cls,
+        joint_names: Sequence[str],
+        points: Sequence[PosePoint],
+        name: str = '',
+        frame_id: str = '',
     ) -> MultiDofTrajectory:
         """
         Build a trajectory from points.
@@ -78,6 +84,7 @@ class MultiDofTrajectory:
         :param joint_names: J names.
         :param points: the points in the order of time.
         :param name: label for reports.
+        :param frame_id: the frame that all of it is in.
         :raises TrajectoryError: as the class does, and for fields of the wrong size.
         """
         names = tuple(joint_names)
@@ -108,11 +115,12 @@ class MultiDofTrajectory:
         )
         for array in arrays:
             array.setflags(write=False)
-        return cls(names, *arrays, name)
+        return cls(names, *arrays, name, frame_id)
 
     def digest(self) -> str:
-        """Return the SHA-256 of what shapes the path, in hex: names, times, points."""
-        digest = hashlib.sha256(json.dumps(['multi_dof/1', *self.joint_names]).encode())
+        """Return the SHA-256 of what shapes the path, in hex: frame, names, times, points."""
+        names = json.dumps(['multi_dof/1', self.frame_id, *self.joint_names])
+        digest = hashlib.sha256(names.encode())
         digest.update(self.times_ns.astype('<i8').tobytes())
         for values in (self.positions, self.quaternions):
             digest.update((values + 0.0).astype('<f8').tobytes())

@@ -11,6 +11,7 @@ from trajectory_guard.free_motion.quaternion_curve import (
     dual_quaternion_motion,
     Rigid,
     rigid_motion,
+    unit_scale,
 )
 from trajectory_guard.free_path import FreePath
 from trajectory_guard.motion import RationalMotion
@@ -135,7 +136,11 @@ def dual_quaternion_spline(
     name: str, knots_ns: Sequence[int], degree: int, dual_quaternions: np.ndarray
 ) -> FreePath:
     """
-    Return the motion of a B-spline of dual quaternions; its pieces define it, cut in doubles.
+    Return the motion of a B-spline of dual quaternions.
+
+    With q and d off by r Q and r D, r from `bezier_pieces`, Q and D their largest lengths, and l
+    the least length of q, the translation 2 d q* / |q|^2 is off by at most 2 r D / l + 2 D r Q /
+    l^2, twice that with the second order.
 
     :param name: the floating joint, or the body.
     :param knots_ns: as in `bezier_pieces` [ns].
@@ -144,8 +149,18 @@ def dual_quaternion_spline(
     :raises RequestError: as for `rigid_spline`.
     """
     pieces = bezier_pieces(knots_ns, degree, dual_quaternions)
-    rule = f'B-spline of dual quaternions, degree {degree}'
-    return _path(name, pieces, dual_quaternion_motion, rule)
+    rounding = 4.0 * degree * U
+    both = np.array(dual_quaternions, float)
+    Q, D = (float(np.sqrt((part**2).sum(axis=1)).max()) for part in (both[:, :4], both[:, 4:]))
+
+    def motion(control: np.ndarray) -> Rigid:
+        rigid = dual_quaternion_motion(control)
+        scale = unit_scale(control[:, :4])
+        least = float(np.sqrt(rigid.motion.weights.min())) / scale
+        shift = 4.0 * rounding * D * (1.0 / least + Q / least**2)
+        return rigid.loosened(rounding * Q * scale, shift)
+
+    return _path(name, pieces, motion, f'B-spline of dual quaternions, degree {degree}')
 
 
 def displacement_spline(
