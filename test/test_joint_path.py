@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from trajectory_guard.errors import Reason, RequestError, TrajectoryError, TrajectoryGuardError
-from trajectory_guard.joint_path import joint_path
+from trajectory_guard.joint_path import joint_path, JointPath
 from trajectory_guard.robot import Joint, JointType, Mimic
 from trajectory_guard.trajectory import JointState, Point, Trajectory
 
@@ -440,3 +440,9 @@ def test_ten_thousand_points():
     assert path.coefficients.shape == (9_999, 6, 6)
     for i in rng.integers(0, 10_000, 20):
         np.testing.assert_allclose(path.position(int(i) * 10**7)[:4], q[i] * 0.1, atol=1e-15)
+
+
+def test_no_time_before_the_first_knot_is_left_out() -> None:
+    """A path made by hand cannot begin late without saying that it does."""
+    with pytest.raises(RequestError, match='unknown_until_ns is 0, the first knot 5'):
+        JointPath(('j',), [True], [5, 6], np.zeros((1, 1, 6)), np.zeros((1, 1)), 0, True)

@@ -84,6 +84,12 @@ class JointPath:
         rises = knots[1:] > knots[:-1] if segments > 1 else knots[1:] >= knots[:-1]
         if not rises.all() or knots[0] < 0:
             raise RequestError(Reason.UNSORTED_TIMES, f'knots_ns must rise, got {self.knots_ns}')
+        # Else the time before the first knot would be nobody's.
+        if self.unknown_until_ns != int(knots[0]):
+            raise RequestError(
+                Reason.INVALID_PARAMETER,
+                f'unknown_until_ns is {self.unknown_until_ns}, the first knot {knots[0]}',
+            )
 
     @property
     def interpolation(self) -> str:
