@@ -1,7 +1,7 @@
 """Free runs in which one solid may lie inside the other; surfaces do not tell (trusted)."""
 
 from collections.abc import Iterator
-from itertools import groupby
+from itertools import groupby, product
 from typing import NamedTuple
 
 import numpy as np
@@ -147,9 +147,8 @@ def _shared(
     for inner, outer in ((link, other), (other, link)):
         if outer.surface is None:
             continue
-        triangles, wound = outer.surface.triangles, outer.surface.is_wound
-        for place in inner.places:
-            if may_contain(outer.points, triangles, wound, place, doubt):
+        for shell, place in product(outer.surface.shells, inner.places):
+            if may_contain(outer.points, shell.triangles, shell.wound, place, doubt):
                 return place
     return None
 
