@@ -136,6 +136,17 @@ def test_a_single_pose_stands() -> None:
 HALF_TURN = (1.0, 0.0, 0.0, 0.0)
 
 
+@pytest.mark.parametrize('rate', [-np.pi, np.pi])
+@pytest.mark.parametrize('off', [-1e-17, 0.0, 1e-17])
+def test_half_a_turn_goes_where_the_velocities_go(rate: float, off: float) -> None:
+    """However the real part of the quaternion is rounded."""
+    turning = [0, 0, 0, rate, 0, 0]
+    points = [point(0, velocity=turning), point(SECOND, turn=(1, 0, 0, off), velocity=turning)]
+    path = multi_dof_path(trajectory(*points), allow_nonzero_end_velocity=True)
+    middle = Rotation.from_matrix(path.pose(SECOND // 2)[:, :3]).as_rotvec()
+    assert middle == pytest.approx([rate / 2.0, 0.0, 0.0], abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ('points', 'reason', 'named'),
     [
@@ -155,13 +166,29 @@ HALF_TURN = (1.0, 0.0, 0.0, 0.0)
         ([point(0, acceleration=[0.0] * 6)], Reason.ACCELERATIONS_WITHOUT_VELOCITIES, 'point 0'),
         ([point(0), point(1, velocity=[0.1] * 6)], Reason.NONZERO_END_VELOCITY, "'base'"),
         ([point(0), point(1, turn=HALF_TURN)], Reason.AMBIGUOUS_TURN, 'point 0 to point 1'),
+        (
+            # From rest to rest either way will do.
+            [point(0, velocity=[0.0] * 6), point(1, turn=HALF_TURN, velocity=[0.0] * 6)],
+            Reason.AMBIGUOUS_TURN,
+            'point 0 to point 1',
+        ),
+        (
+            # Each end would go the other way.
+            [
+                point(0, velocity=[0, 0, 0, 3, 0, 0]),
+                point(SECOND, turn=HALF_TURN, velocity=[0, 0, 0, -3, 0, 0]),
+                point(2 * SECOND, turn=HALF_TURN),
+            ],
+            Reason.AMBIGUOUS_TURN,
+            'point 0 to point 1',
+        ),
         ([point(0), point(1, (1e300, 0, 0))], Reason.TOO_LARGE, 'positions[1, 0]'),
         (
-            # Backwards by a half turn on the way to a half turn forwards.
+            # Backwards by a half turn on the way to nearly a half turn forwards.
             [
                 point(0, velocity=[0, 0, 0, -8, 0, 0]),
-                point(SECOND, turn=HALF_TURN, velocity=[0, 0, 0, -8, 0, 0]),
-                point(2 * SECOND, turn=HALF_TURN, velocity=[0.0] * 6),
+                point(SECOND, turn=(0.9999, 0, 0, 0.01), velocity=[0, 0, 0, -8, 0, 0]),
+                point(2 * SECOND, turn=(0.9999, 0, 0, 0.01), velocity=[0.0] * 6),
             ],
             Reason.TOO_LARGE,
             'turns too fast',

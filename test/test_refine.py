@@ -114,6 +114,7 @@ def test_collisions_are_proved_on_the_faces(tmp_path):
 
 
 SHELL = joined(box((-0.2,) * 3, (0.2,) * 3), box((-0.15,) * 3, (0.15,) * 3, inward=True))
+TURNED = Triangles(SHELL.points, SHELL.triangles[:, ::-1])
 CAVITY = ((0, 0, 0), (0.05, 0.1, 0.02))
 MATERIAL = ((0.175, 0, 0), (0.175, 0.1, 0.02))
 
@@ -126,10 +127,21 @@ MATERIAL = ((0.175, 0, 0), (0.175, 0.1, 0.02))
         (extruded(U, 3), ((0.15, 0.05, 0), (0.15, 0.1, 0.02)), False),
         (SHELL, CAVITY, True),
         (SHELL, MATERIAL, False),
+        (joined(SHELL, TURNED), CAVITY, True),
+        (joined(SHELL, TURNED), MATERIAL, False),
         (without(SHELL, 0), CAVITY, True),
         (without(SHELL, 0), MATERIAL, True),
     ],
-    ids=['beside U', 'in U', 'cavity', 'in the shell', 'open', 'open, inside'],
+    ids=[
+        'beside U',
+        'in U',
+        'cavity',
+        'in the shell',
+        'two-sided, cavity',
+        'two-sided, in the shell',
+        'open',
+        'open, inside',
+    ],
 )
 def test_what_lies_inside_is_not_free(mesh, places, free, swapped, tmp_path):
     """A pebble inside a solid touches no face of it; the mesh is the obstacle, or the link."""

@@ -22,7 +22,7 @@ def test_a_solid_that_is_not_convex_knows_its_surface(mesh):
     """Closed and wound alike, in one piece."""
     found = surface(mesh)
     assert len(found.triangles) == len(mesh.triangles)
-    assert found.is_watertight and found.is_wound
+    assert [shell.wound for shell in found.shells] == [True]
     assert len(found.pieces) == 1
 
 
@@ -30,7 +30,7 @@ def test_a_convex_solid_is_its_hull():
     """Nothing finer is known of a box; of a box with a hole there is."""
     assert surface(box((0, 0, 0), (1, 2, 3))) is None
     opened = surface(without(box((0, 0, 0), (1, 2, 3)), 4))
-    assert not opened.is_watertight and not opened.is_wound
+    assert not opened.is_watertight and not opened.shells
 
 
 def test_one_triangle_cannot_be_halved():
@@ -44,7 +44,37 @@ def test_edges_are_counted_whatever_the_winding():
     turned = mesh.triangles.copy()
     turned[3] = turned[3][::-1]
     found = surface(Triangles(mesh.points, turned))
-    assert found.is_watertight and not found.is_wound
+    assert found.is_watertight and [shell.wound for shell in found.shells] == [False]
+
+
+def repeated(mesh, faces, back):
+    """Return a mesh with some of its triangles drawn again, or their backs."""
+    more = mesh.triangles[faces]
+    return Triangles(mesh.points, np.vstack([mesh.triangles, more[:, ::-1] if back else more]))
+
+
+@pytest.mark.parametrize('back', [False, True])
+@pytest.mark.parametrize('faces', [slice(None), slice(3), slice(1)], ids=['all', 'three', 'one'])
+def test_what_is_drawn_twice_has_the_inside_of_what_is_drawn_once(faces, back):
+    """Seen from both sides, or by mistake: each triangle counts once."""
+    mesh = extruded(U)
+    found = surface(repeated(mesh, faces, back))
+    assert found.is_watertight
+    for shell in found.shells:
+        if len(shell.triangles) == len(mesh.triangles):
+            assert shell.wound
+            break
+    else:
+        pytest.fail('no shell has each triangle once')
+    assert not surface(repeated(without(mesh, 5), faces, back)).is_watertight
+
+
+def test_a_wall_between_two_cells_may_be_drawn_twice():
+    """Once it would open the edges around it."""
+    found = surface(
+        joined(box((0, 0, 0), (1, 1, 1)), box((1, 0, 0), (2, 1, 1)), box((0, 1, 0), (1, 2, 1)))
+    )
+    assert [len(shell.triangles) for shell in found.shells] == [36]
 
 
 def test_a_triangle_without_area_between_two_equal_corners_is_no_edge():
@@ -59,7 +89,7 @@ def test_pieces_that_do_not_hang_together():
     """One corner of each; shells inside of each other are pieces, too."""
     mesh = joined(box((-1, -1, -1), (1, 1, 1)), box((-0.5,) * 3, (0.5,) * 3, inward=True), ring())
     found = surface(mesh)
-    assert found.is_watertight and found.is_wound
+    assert [shell.wound for shell in found.shells] == [True]
     assert len(found.pieces) == 3
     assert len({tuple(np.abs(found.points[i]).round(1)) for i in found.pieces}) == 3
 

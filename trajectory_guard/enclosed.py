@@ -1,13 +1,14 @@
 """Free runs in which one solid may lie inside the other; surfaces do not tell (trusted)."""
 
 from collections.abc import Iterator
-from itertools import groupby
+from itertools import groupby, product
 from typing import NamedTuple
 
 import numpy as np
 
 from trajectory_guard.containment import may_contain
 from trajectory_guard.detail import Detail, Level
+from trajectory_guard.jumps import jumps
 from trajectory_guard.kernels.layout import (
     BALL,
     BY_ENCLOSURE,
@@ -50,7 +51,9 @@ def without_enclosures(detail: Detail, seen: Seen, path: Path) -> np.ndarray:
     Where the pairs of parts are closed, the two surfaces keep apart, or a surface from a convex
     solid. On a connected run of such pieces, with all of the tracking tubes, nothing then enters
     or leaves: if the solids are disjoint at one instant of the nominal path, they are so at every
-    one. Let A and B be solids whose surfaces are disjoint and which have a common point. The part
+    one, up to where segments do not join: there the path may leap inside, and a run begins anew.
+
+    Let A and B be solids whose surfaces are disjoint and which have a common point. The part
     of their intersection around it is bounded, so it has a boundary point, of the surface of A,
     say, and inside B; the whole connected piece of that surface then is inside B. So one point of
     each connected piece of either's surface is enough, and any point of a convex solid. Nothing is
@@ -62,12 +65,15 @@ def without_enclosures(detail: Detail, seen: Seen, path: Path) -> np.ndarray:
     :returns: (L,) LEAF that name wholes.
     """
     covered, level = seen
-    leaves = level.wholes(covered.leaves)
+    leaps = jumps(path)
+    leaves = _cut(level.wholes(covered.leaves), leaps)
+    stretch = np.searchsorted(leaps, leaves['segment'], side='right')
     first = 0
-    for free, run in groupby(leaves['status'] == FREE):
+    for (free, _), run in groupby(zip(leaves['status'] == FREE, stretch, strict=True)):
         last = first + len(list(run))
         if free:
-            for body, obstacle in _opened_in(covered.opened, leaves[first], leaves[last - 1]):
+            begin, stop = _begins(leaves[first]), _ends(leaves, last)
+            for body, obstacle in _opened_in(covered.opened, begin, stop):
                 place = _shared(detail, level, path, leaves[first], body, obstacle)
                 if place is not None:
                     _give_up(leaves[first:last], body, obstacle, place)
@@ -76,10 +82,34 @@ def without_enclosures(detail: Detail, seen: Seen, path: Path) -> np.ndarray:
     return leaves
 
 
-def _opened_in(opened: np.ndarray, start: np.void, end: np.void) -> Iterator[tuple[int, int]]:
-    """Yield the pairs that were taken apart on a piece that meets a run of leaves, each once."""
-    begin = _fraction(start['segment'], start['start'], start['level'])
-    stop = _fraction(end['segment'], end['end'], end['level'])
+def _cut(leaves: np.ndarray, leaps: np.ndarray) -> np.ndarray:
+    """Return leaves of which one begins at each jump within a free run: it may be left out."""
+    known = leaves['segment'][leaves['start'] == 0]
+    missing = np.setdiff1d(leaps, known)
+    at = np.searchsorted(leaves['segment'], missing)
+    inner = (at > 0) & (at < len(leaves))
+    missing, at = missing[inner], at[inner]
+    free = leaves['status'][at] == FREE
+    added = leaves[at[free]]
+    added['segment'] = missing[free]
+    added['start'], added['end'], added['level'] = 0, 1, DEEPEST
+    return np.insert(leaves, at[free], added)
+
+
+def _begins(leaf: np.void) -> float:
+    return float(_fraction(leaf['segment'], leaf['start'], leaf['level']))
+
+
+def _ends(leaves: np.ndarray, last: int) -> float:
+    """Return where a run ends, up to its end leaves may be left out: where the next one begins."""
+    if last < len(leaves):
+        return _begins(leaves[last])
+    leaf = leaves[last - 1]
+    return float(_fraction(leaf['segment'], leaf['end'], leaf['level']))
+
+
+def _opened_in(opened: np.ndarray, begin: float, stop: float) -> Iterator[tuple[int, int]]:
+    """Yield the pairs that were taken apart on a piece that meets a span, each once."""
     low = _fraction(opened['segment'], opened['numerator'], opened['level'])
     high = _fraction(opened['segment'], opened['numerator'] + 1, opened['level'])
     # Rounding to a double may only join what does not meet.
@@ -90,7 +120,7 @@ def _opened_in(opened: np.ndarray, start: np.void, end: np.void) -> Iterator[tup
 
 def _fraction(segment: np.ndarray, numerator: np.ndarray, level: np.ndarray) -> np.ndarray:
     """Return times in segments, rounded monotonically."""
-    return segment + np.ldexp(numerator.astype(float), -level.astype(np.int32))
+    return segment + np.ldexp(np.asarray(numerator, float), -np.asarray(level, np.int32))
 
 
 def _shared(
@@ -117,9 +147,8 @@ def _shared(
     for inner, outer in ((link, other), (other, link)):
         if outer.surface is None:
             continue
-        triangles, wound = outer.surface.triangles, outer.surface.is_wound
-        for place in inner.places:
-            if may_contain(outer.points, triangles, wound, place, doubt):
+        for shell, place in product(outer.surface.shells, inner.places):
+            if may_contain(outer.points, shell.triangles, shell.wound, place, doubt):
                 return place
     return None
 

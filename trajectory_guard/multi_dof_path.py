@@ -54,9 +54,9 @@ def multi_dof_path(
     :param trajectory: the message.
     :param joint: which of its joints.
     :param allow_nonzero_end_velocity: accept a last point that does not rest.
-    :raises TrajectoryError: two orientations are half a turn apart and carry no velocities, the
-        orientation turns too far for its derivatives, the last point moves, or a number is too
-        large.
+    :raises TrajectoryError: two orientations are half a turn apart and no velocities tell which
+        way it goes, the orientation turns too far for its derivatives, the last point moves, or a
+        number is too large.
     """
     if not allow_nonzero_end_velocity:
         _check_end(trajectory, joint)
@@ -80,7 +80,7 @@ def multi_dof_path(
             raise TrajectoryError(
                 Reason.AMBIGUOUS_TURN,
                 f'from point {i} to point {i + 1} the orientation turns by half a turn, which may '
-                'go either way; add a point in between, or angular velocities',
+                'go either way; add a point in between, or angular velocities that tell',
             ) from error
     return _path(trajectory, joint, times, curves)
 
@@ -142,7 +142,7 @@ def _segment(a: _Knot, b: _Knot, h: float) -> Rigid:
         turn += 256.0 * _U
         direction = 0.0
     else:
-        q, size = _hermite(a, _same_side(a, b), h, _quaternions)
+        q, size = _hermite(a, _same_side(a, b, h), h, _quaternions)
         turn, direction = 0.0, 64.0 * _U * size
     curve = rigid_motion(q, p).loosened(direction, shift)
     return curve._replace(turn_error=curve.turn_error + turn)
@@ -201,9 +201,19 @@ def _quaternions(knot: _Knot) -> list[np.ndarray]:
     return known
 
 
-def _same_side(a: _Knot, b: _Knot) -> _Knot:
-    """Return the second knot with the sign of its quaternion nearer to the first's."""
-    return b if a.quaternion @ b.quaternion >= 0.0 else b._replace(quaternion=-b.quaternion)
+def _same_side(a: _Knot, b: _Knot, h: float) -> _Knot:
+    """
+    Return the second knot with the sign of its quaternion nearer to the first's.
+
+    Half a turn apart neither is: the side is then the one that both ends turn to, where q' b at
+    the first and -q' a at the second, times h, add up to more; an even turn by pi makes that pi.
+    """
+    near = float(a.quaternion @ b.quaternion)
+    if abs(near) <= 0.5 * HALF_TURN_BAND:
+        near = h * float(_quaternions(a)[1] @ b.quaternion - a.quaternion @ _quaternions(b)[1])
+        if not abs(near) > HALF_TURN_BAND:
+            raise _HalfTurn
+    return b if near >= 0.0 else b._replace(quaternion=-b.quaternion)
 
 
 def _short_turn(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, float]:

@@ -23,6 +23,21 @@ class Placed(NamedTuple):
     turn: np.ndarray
 
 
+class Shell(NamedTuple):
+    """
+    Triangles of which every edge has an even number.
+
+    Then rays from a point meet them an odd number of times, or an even one, whatever their
+    direction: there is an inside, however they are wound.
+
+    :param triangles: (m, 3) indices.
+    :param wound: whether each edge is run through equally often in both directions.
+    """
+
+    triangles: np.ndarray
+    wound: bool
+
+
 # Without slots, so that what was computed can be kept.
 @dataclass(frozen=True, eq=False)
 class Surface:
@@ -59,29 +74,44 @@ class Surface:
         return Placed(points, ball, turn)
 
     @cached_property
-    def _proper(self) -> np.ndarray:
-        a, b, c = self.triangles.T
-        return self.triangles[(a != b) & (b != c) & (c != a)]
+    def is_watertight(self) -> bool:
+        """Whether it has an inside."""
+        return bool(self.shells)
 
     @cached_property
-    def is_watertight(self) -> bool:
+    def shells(self) -> tuple[Shell, ...]:
         """
-        Whether every edge has an even number of triangles.
+        What of the surface has an inside, none if it is open; what is inside one is inside.
 
-        Then rays from a point meet the surface an odd number of times, or an even one, whatever
-        their direction: it has an inside, however its triangles are wound.
+        That is the surface as it is, and with each triangle once: drawn twice, to be seen from
+        both sides, it would cancel, and drawn three times it would open its neighbours' edges.
         """
-        ends = np.sort(self._proper[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        a, b, c = self.triangles.T
+        proper = self.triangles[(a != b) & (b != c) & (c != a)]
+        _, first, of = np.unique(
+            np.sort(proper, axis=1), axis=0, return_index=True, return_inverse=True
+        )
+        of = of.ravel()
+        once = proper[np.sort(first)]
+        candidates = [once]
+        if len(once) < len(proper):
+            odd = (np.bincount(of) % 2).any()
+            # What is drawn an even number of times bounds nothing, unless it winds round it.
+            if odd or (np.bincount(of, _side(proper)).any() and self._is_wound(proper)):
+                candidates.append(proper)
+        shells = [rows for rows in candidates if len(rows) and self._is_closed(rows)]
+        return tuple(Shell(rows, self._is_wound(rows)) for rows in shells)
+
+    def _is_closed(self, triangles: np.ndarray) -> bool:
+        ends = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
         edges = ends[:, 0] * np.int64(len(self.points)) + ends[:, 1]
         return bool((np.unique(edges, return_counts=True)[1] % 2 == 0).all())
 
-    @cached_property
-    def is_wound(self) -> bool:
-        """Whether each edge is run through equally often in both directions."""
+    def _is_wound(self, triangles: np.ndarray) -> bool:
         # Brings scipy, as below; few requests need it.
         from trajectory_guard.inscribed import is_closed
 
-        return is_closed(self._proper, len(self.points))
+        return is_closed(triangles, len(self.points))
 
     @cached_property
     def pieces(self) -> np.ndarray:
@@ -95,3 +125,9 @@ class Surface:
         graph = coo_array((np.ones(len(rows), bool), (rows, columns)), shape=(count, count))
         _, first = np.unique(connected_components(graph, directed=False)[1], return_index=True)
         return first
+
+
+def _side(triangles: np.ndarray) -> np.ndarray:
+    """Return 1 or -1 for each triangle: equal for two with the same corners if wound alike."""
+    a, b, c = triangles.T
+    return np.where((a < b) ^ (b < c) ^ (c < a), 1.0, -1.0)
