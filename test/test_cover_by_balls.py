@@ -1,10 +1,12 @@
 """The cover by balls of displacements: the same arms and bodies, and never a wrong free."""
 
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 from bench_data import cases, ROBOTS, SETTINGS, workcell
 import coal
+from meshes import box, without
 import numpy as np
 import pytest
 from rational_curves import random_rigid_motion
@@ -23,7 +25,9 @@ from trajectory_guard.primitive import Box, Cylinder, Sphere
 from trajectory_guard.result import Status, Verdict
 from trajectory_guard.scene import Obstacle, Scene
 from trajectory_guard.settings import Cover, Scope, Settings
-from trajectory_guard.trajectory import JointState
+from trajectory_guard.surface import Surface
+from trajectory_guard.toleranced.pair import pair_of
+from trajectory_guard.trajectory import JointState, Point, Trajectory
 from trajectory_guard.urdf import robot_from_urdf
 from trajectory_guard.workcell import Workcell
 
@@ -239,3 +243,129 @@ def test_a_floating_joint_may_hang_anywhere_at_the_root() -> None:
         first = certify(work, held, Settings(cover=cover, tolerance=1e-3)).intervals[0]
         assert first.status is Status.FREE
         assert first.end_ns == pytest.approx(0.4 * SECOND, abs=2e-3 * SECOND)
+
+
+def standing(x: float, scale: float = 1.0) -> FreePath:
+    points = np.column_stack([scale * np.eye(3), (x, 0.0, 0.0)])[None]
+    return FreePath.exact([RationalMotion(points, np.ones(1))], [0, 0])
+
+
+def test_an_affine_motion_stretches_what_is_round() -> None:
+    """A sphere of 0.1 m becomes one of 0.3 m, and touches a box whose side is 0.25 m away."""
+    work = single(Sphere(0.1), Box((0.2, 0.2, 0.2)))
+    for cover in Cover:
+        asked = Settings(cover=cover, tolerance=1e-3)
+        assert certify(work, standing(0.35, 3.0), asked).verdict is not Verdict.FREE
+        assert certify(work, standing(0.45, 3.0), asked).verdict is Verdict.FREE
+
+
+def solid(half: float, inward: bool = False) -> ConvexBody:
+    mesh = box((-half,) * 3, (half,) * 3, inward)
+    return ConvexBody(mesh.points, surface=Surface(mesh.points, mesh.triangles))
+
+
+@pytest.mark.parametrize('inward', [False, True])
+def test_obstacles_are_solids_each_by_itself(inward: bool) -> None:
+    """Inside of two, whichever way they are wound, is inside of both."""
+    scene = Scene((Obstacle('one', (solid(1.0),)), Obstacle('other', (solid(0.5, inward),))), '')
+    work = Workcell(free_body('part', Box((0.1, 0.1, 0.1))), scene)
+    for x, free in ((0.0, False), (0.75, False), (1.2, True)):
+        result = certify(work, standing(x), BALLS)
+        assert (result.verdict is Verdict.FREE) == free
+        assert free or result.intervals[0].reason == 'enclosure'
+
+
+def test_solids_of_a_polyhedron_have_no_vertex_in_common() -> None:
+    one = faceted(BODIES['box']).polyhedron
+    with pytest.raises(RequestError, match='in common'):
+        pair_of(one, one, solids=np.arange(len(one.faces)))
+    with pytest.raises(RequestError, match='solids must be integers of shape'):
+        pair_of(one, one, solids=np.zeros(1, np.int64))
+
+
+def prism() -> np.ndarray:
+    """Caps of many corners that rounding leaves off their planes."""
+    rng = np.random.default_rng(0)
+    turn = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+    ring = np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    points = np.concatenate([ring, ring + (0.0, 0.0, 1.0)])
+    return points @ np.linalg.qr(rng.normal(size=(3, 3)))[0].T
+
+
+def test_a_hull_contains_what_lies_between_its_corners() -> None:
+    """In exact arithmetic: triangles of a cap that rounding made concave leave some of it out."""
+    points = prism()
+    polyhedron, ball = faceted(ConvexBody(points))
+    exact = [[Fraction(x) for x in vertex] for vertex in polyhedron.vertices.tolist()]
+    centre = [Fraction(x) for x in polyhedron.vertices.mean(axis=0).tolist()]
+    triangles = [
+        [[a - b for a, b in zip(exact[v], centre, strict=True)] for v in face]
+        for face in polyhedron.triangles
+    ]
+    rng = np.random.default_rng(1)
+    outside = 0
+    for _ in range(40):
+        pair = 64 * rng.integers(2) + rng.choice(64, 2, replace=False)
+        ends = [[Fraction(x) for x in points[i].tolist()] for i in pair]
+        y = [(a + b) / 2 - c for a, b, c in zip(*ends, centre, strict=True)]
+        leaves = max(filter(None, (passes(y, corners) for corners in triangles)))
+        outside += leaves < 1
+        assert (1 - leaves) * Fraction(float(np.linalg.norm([float(a) for a in y]))) <= ball
+    assert outside > 0
+
+
+def passes(y: list[Fraction], corners: list[list[Fraction]]) -> Fraction | None:
+    """Return t where t y lies in a triangle, None if no positive t does."""
+
+    def volume(a: list[Fraction], b: list[Fraction], c: list[Fraction]) -> Fraction:
+        return sum(a[i] * (b[i - 2] * c[i - 1] - b[i - 1] * c[i - 2]) for i in range(3))
+
+    a, b, c = corners
+    shares = volume(y, b, c), volume(a, y, c), volume(a, b, y)
+    if not sum(shares) or min(shares) < 0:
+        return None
+    return volume(a, b, c) / sum(shares)
+
+
+def test_corners_that_qhull_drops_cost_what_they_stand_out() -> None:
+    rng = np.random.default_rng(0)
+    grid = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), axis=-1).reshape(-1, 3)
+    grid = grid @ np.linalg.qr(rng.normal(size=(3, 3)))[0].T
+    assert faceted(ConvexBody(grid + 1e-12 * rng.normal(size=grid.shape))).ball < 1e-10
+
+
+LEVER = (
+    '<robot name="r"><link name="map"/><link name="arm"><collision><origin xyz="1000 0 0"/>'
+    '<geometry><box size="0.1 0.1 0.1"/></geometry></collision></link><joint name="j" '
+    'type="continuous"><parent link="map"/><child link="arm"/><axis xyz="0 0 1"/></joint></robot>'
+)
+
+
+@pytest.mark.parametrize(
+    ('settings', 'reason'), [({'deadline_ns': 10**7}, 'deadline'), ({'max_pieces': 9}, 'budget')]
+)
+def test_building_motions_ends_in_time(settings: dict, reason: str) -> None:
+    """At this tolerance the rounding of a kilometre alone is too much, on every short piece."""
+    post = Box((0.2, 0.2, 0.2)).load().body
+    work = Workcell(robot_from_urdf(LEVER), Scene((Obstacle('post', (post,)),), ''))
+    points = [Point(i * SECOND, (0.1 * i,)) for i in range(20)]
+    asked = Settings(cover=Cover.BALL, tolerance=1e-9, **settings)
+    result = judge(work, Trajectory.from_points(('j',), points), settings=asked)
+    assert result.intervals[0].reason == reason
+    assert result.compute_time < 1.0
+
+
+def test_any_number_of_pieces_may_be_allowed() -> None:
+    asked = Settings(cover=Cover.BALL, max_pieces=2**63 - 1)
+    work = single(Box((0.1, 0.1, 0.1)), Box((0.2, 0.2, 0.2)))
+    assert certify(work, standing(1.0), asked).verdict is Verdict.FREE
+
+
+def test_open_meshes_are_told_of_as_by_the_hull() -> None:
+    mesh = without(box((-1.0,) * 3, (1.0,) * 3), 0)
+    body = ConvexBody(mesh.points, surface=Surface(mesh.points, mesh.triangles))
+    work = Workcell(free_body('part', Sphere(0.1)), Scene((Obstacle('bin', (body,)),), ''))
+    for cover in Cover:
+        result = certify(work, standing(0.0), Settings(cover=cover))
+        assert result.verdict is Verdict.FREE
+        assert result.warnings == ('open meshes, so nothing counts as inside: bin',)

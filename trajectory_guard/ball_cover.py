@@ -16,6 +16,7 @@ import numpy as np
 from trajectory_guard.body import ConvexBody, U
 from trajectory_guard.errors import RequestError
 from trajectory_guard.facets import Faceted, faceted, joined
+from trajectory_guard.floating import stretch
 from trajectory_guard.free_path import FreePath
 from trajectory_guard.joint_path import JointPath
 from trajectory_guard.kernels import layout
@@ -80,16 +81,18 @@ class BallCell:
         self._pairs: dict[tuple[int, int], Pair] = {}
         self.targets = _grouped([faceted(body) for body in obstacles])
 
-    def ball(self, body: int, target: int) -> float:
-        """Return the thickness of a body and its targets together [m]."""
-        return self._link(body).ball + self.targets[target].ball
+    def link_ball(self, body: int) -> float:
+        """Return the ball within which a body's polyhedron contains it [m]."""
+        return self._link(body).ball
 
     def pair(self, body: int, target: int) -> Pair:
         """Return a body and its targets, prepared."""
         key = body, target
         if key not in self._pairs:
-            polyhedron = self.targets[target].polyhedron
-            self._pairs[key] = pair_of(self._link(body).polyhedron, polyhedron)
+            targets = self.targets[target]
+            self._pairs[key] = pair_of(
+                self._link(body).polyhedron, targets.polyhedron, solids=targets.owner
+            )
         return self._pairs[key]
 
     def _link(self, body: int) -> Faceted:
@@ -123,11 +126,13 @@ class _Part(NamedTuple):
     :param motion: the motion, None if no bound for it is known.
     :param numerator: place of the piece.
     :param level: its power of two.
+    :param ball: the ball around the body's polyhedron, as large as the motion may make it [m].
     """
 
     motion: RationalMotion | None
     numerator: int
     level: int
+    ball: float
 
 
 class _Open(NamedTuple):
@@ -178,7 +183,7 @@ def cover_by_balls(
         found = [
             span
             for b in bodies.tolist()
-            for part in work.parts(b, segment)
+            for part in work.parts(cell, b, segment)
             for span in work.opened(cell, b, part)
         ]
         leaves.append(_leaves(segment, found))
@@ -212,22 +217,41 @@ class _Work:
         self._settings, self._stop, self._left = settings, stop, tests
         self.pieces = 0
 
-    def parts(self, body: int, segment: int) -> list[_Part]:
+    def parts(self, cell: BallCell, body: int, segment: int) -> list[_Part]:
         """Return motions of a body that together are a segment, none off by much."""
         free = self._path.floating
+        ball = self._ball(cell, body, segment)
         if free is not None and self._carried(body):
-            return [_Part(self._given(free, body, segment), 0, 0)]
+            return [_Part(self._given(free, body, segment), 0, 0, ball)]
         done: list[_Part] = []
         waiting = [(0, 0)]
         while waiting:
             numerator, level = waiting.pop()
             motion = self._built(body, segment, numerator, level)
+            self._left -= TESTS
             good = motion is not None and motion.error <= WORTH * self._settings.tolerance
-            if good or level == DEEPEST_MOTION:
-                done.append(_Part(motion, numerator, level))
+            spent = self._stop[0] or self._left <= 0
+            if good or spent or level == DEEPEST_MOTION:
+                done.append(_Part(motion, numerator, level, ball))
             else:
                 waiting += [(2 * numerator + 1, level + 1), (2 * numerator, level + 1)]
         return done
+
+    def _ball(self, cell: BallCell, body: int, segment: int) -> float:
+        """
+        Bound the ball around a body's polyhedron in a segment [m].
+
+        A rigid motion leaves it as it is. The linear part of an affine one makes no vector longer
+        than 1 + stretch times its length, and is itself off by turn_error. The error of a motion
+        that is built counts that for the body's own ball already.
+        """
+        ball = cell.link_ball(body)
+        free = self._path.floating
+        if free is None:
+            return ball
+        own = 0.0 if self._carried(body) else float(self._workcell.links.size[body, layout.BALL])
+        longer = stretch(free.motions[segment])[0] + float(free.turn_error[segment])
+        return (ball + longer * max(0.0, ball - own)) * (1.0 + 8.0 * U)
 
     def _carried(self, body: int) -> bool:
         """Say whether a body hangs on the floating joint itself."""
@@ -280,9 +304,9 @@ class _Work:
         whole = DEEPEST - part.level
         start = part.numerator << whole
         if part.motion is None or self._stop[0] or self._left <= 0:
-            reason = layout.BY_DEPTH
-            if part.motion is not None:
-                reason = layout.BY_STOP if self._stop[0] else layout.BY_BUDGET
+            reason = layout.BY_STOP
+            if not self._stop[0]:
+                reason = layout.BY_DEPTH if part.motion is None else layout.BY_BUDGET
             return [_Open(start, start + (1 << whole), reason, body, -1, (0.0, 0.0, 0.0))]
         found = []
         for target, targets in enumerate(cell.targets):
@@ -290,7 +314,7 @@ class _Work:
                 cell.pair(body, target),
                 part.motion,
                 epsilon=0.5 * self._settings.tolerance,
-                clearance=(self._settings.clearance + cell.ball(body, target)) * (1.0 + 4.0 * U),
+                clearance=(self._settings.clearance + part.ball + targets.ball) * (1.0 + 4.0 * U),
                 max_depth=whole,
                 max_tests=max(1, self._left),
                 stop=self._stop,

@@ -334,15 +334,17 @@ def _mesh_warnings(
 ) -> list[str]:
     """Return which meshes were taken for something else than solids of their own shape."""
     warnings = []
-    if len(covered.opened):
-        links, obstacles = workcell.detail.surfaces
-        opened = {
-            *((links[b], workcell.link_names[b]) for b in covered.opened['body']),
-            *((obstacles[o], workcell.obstacle_names[o]) for o in covered.opened['obstacle']),
-        }
-        names = {name for surface, name in opened if surface and not surface.is_watertight}
-        if names:
-            warnings.append(f'open meshes, so nothing counts as inside: {_listed(names)}')
+    links, obstacles = workcell.detail.surfaces
+    moving, still = covered.opened['body'], covered.opened['obstacle']
+    if settings.cover is Cover.BALL:
+        moving, still = np.arange(len(links)), np.arange(len(obstacles))
+    opened = {
+        *((links[b], workcell.link_names[b]) for b in moving),
+        *((obstacles[o], workcell.obstacle_names[o]) for o in still),
+    }
+    names = {name for surface, name in opened if surface and not surface.is_watertight}
+    if names:
+        warnings.append(f'open meshes, so nothing counts as inside: {_listed(names)}')
     if settings.want_certificate:
         named = {name for row in rows for name in (row.body, row.obstacle)}
         names = named & workcell.refinable

@@ -6,7 +6,6 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from trajectory_guard.body import ConvexBody, U
-from trajectory_guard.hull import distance_bound
 from trajectory_guard.polyhedron import Polyhedron
 from trajectory_guard.surface import Surface
 
@@ -15,6 +14,9 @@ SIDES = 24
 
 # How far a body without extent in some direction is given one: as a part of its size and ball.
 THICKNESS = 2.0**-12
+
+# Heights of points over faces that are computed together.
+AT_ONCE = 2**22
 
 
 class Faceted(NamedTuple):
@@ -42,9 +44,9 @@ def faceted(body: ConvexBody) -> Faceted:
         mesh = _mesh(body.surface)
         if mesh is not None:
             return mesh
-    points = body.vertices
+    points, ball = body.vertices, body.ball
     if body.disc_radius:
-        points = (points[:, None] + _around(body.disc_axis, body.disc_radius)).reshape(-1, 3)
+        points, ball = _plus(points, ball, _around(body.disc_axis, body.disc_radius))
     # Whether the hull has an inside must not depend on rounding.
     centre = points.mean(axis=0)
     sizes = np.linalg.svd(points - centre, compute_uv=False)
@@ -52,8 +54,14 @@ def faceted(body: ConvexBody) -> Faceted:
     thin = THICKNESS * (size + body.ball) or U * (1.0 + float(np.abs(points).max()))
     if len(points) < 4 or len(sizes) < 3 or sizes[2] < thin:
         corners = thin * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
-        points = (points[:, None] + corners).reshape(-1, 3)
-    return _hull(points, body.ball)
+        points, ball = _plus(points, ball, corners)
+    return _hull(points, ball)
+
+
+def _plus(points: np.ndarray, ball: float, others: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the sums of points and others, and the ball with what rounding moves them by."""
+    sums = (points[:, None] + others).reshape(-1, 3)
+    return sums, float((ball + 2.0 * U * np.abs(sums).max()) * (1.0 + 4.0 * U))
 
 
 def _mesh(surface: Surface) -> Faceted | None:
@@ -97,15 +105,45 @@ def _hull(points: np.ndarray, ball: float) -> Faceted:
         polyhedron = Polyhedron.from_triangles(points, triangles)
     except ValueError:
         return _box(points, ball)
-    if not polyhedron.watertight:
+    if not polyhedron.watertight or len(polyhedron.faces) < len(triangles):
         return _box(points, ball)
-    dropped = np.ones(len(points), bool)
-    dropped[hull.vertices] = False
-    centre = points[hull.vertices].mean(axis=0)
-    distance = distance_bound(points[dropped], points[hull.simplices], hull.neighbors, centre)
-    # Shifting a corner by the middle rounds where qhull sees it, not where it is.
-    grown = (ball + float(distance.max(initial=0.0))) * (1.0 + 4.0 * U)
-    return Faceted(polyhedron, grown)
+    grown = (ball + _beyond(points, polyhedron, hull.equations[:, :3])) * (1.0 + 4.0 * U)
+    return Faceted(polyhedron, grown) if np.isfinite(grown) else _box(points, ball)
+
+
+def _beyond(points: np.ndarray, polyhedron: Polyhedron, normals: np.ndarray) -> float:
+    """
+    Bound the distance of the points' convex hull from a polyhedron that is nearly it [m].
+
+    Qhull merges facets, drops points and decides with rounding, so that its triangles need not be
+    convex. Let c be inside, and y in the hull but outside the polyhedron. The segment from c to y
+    leaves through a triangle, at z, and y - c = t (z - c) with t > 1. For any n
+
+        (t - 1) n.(z - c) = n.(y - z),    |y - z| = (t - 1) |z - c|;
+
+    n.(z - c) is at least the least height h of the triangle's corners over c, and n.(y - z) at
+    most the largest height of all points less h. So the distance is at most the largest of
+    (top - h) / h times |z - c|, if every h > 0: then every triangle that has an area to speak of
+    turns its inside to c, and the polyhedron winds round it. A height is off by less than 8 u of
+    the coordinates' size: the difference from c, three products and two sums.
+
+    :param points: (n, 3) [m].
+    :param polyhedron: closed triangles between some of them.
+    :param normals: (F, 3) about the triangles' normals, outward, of length 1.
+    :returns: infinity if nothing is known.
+    """
+    c = polyhedron.vertices.mean(axis=0)
+    x, corners = points - c, polyhedron.vertices[polyhedron.triangles] - c
+    rounding = 16.0 * U * float(np.abs(points).max() + np.abs(c).max())
+    low = np.einsum('fkr,fr->fk', corners, normals).min(axis=1) - rounding
+    if not (low > 0.0).all():
+        return np.inf
+    rows = max(1, AT_ONCE // len(x))
+    top = np.concatenate(
+        [(normals[i : i + rows] @ x.T).max(axis=1) for i in range(0, len(normals), rows)]
+    )
+    beyond = ((top + rounding - low) / low).max()
+    return float(beyond * np.linalg.norm(corners, axis=2).max() * (1.0 + 16.0 * U))
 
 
 def _box(points: np.ndarray, ball: float) -> Faceted:

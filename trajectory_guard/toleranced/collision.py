@@ -30,6 +30,9 @@ SHARED_LEVEL = 4
 # Times are exact in a double up to here.
 DEEPEST = 48
 
+# More tests than this nobody waits for, and the kernels cannot count.
+MOST_TESTS = 2**62
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Collisions:
@@ -138,7 +141,8 @@ def collisions(
         raise _invalid(f'max_depth must be <= {DEEPEST}, got {max_depth}')
     flag = np.zeros(1, np.int64) if stop is None else stop
     errors = errors_of(motion)
-    limits = Limits(clearance, *errors, epsilon, max_depth, max_tests, not hierarchy, adapted)
+    tests = min(max_tests, MOST_TESTS)
+    limits = Limits(clearance, *errors, epsilon, max_depth, tests, not hierarchy, adapted)
     ask = partial(ball.cover, pair.packed, curve, stop=flag)
     done = list(_shared(ask, limits, threads)) if hierarchy else [ask(limits)]
     return _answer(pair, curve, done)

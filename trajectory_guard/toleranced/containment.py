@@ -17,23 +17,37 @@ class Probe:
     """
     A polyhedron, and a vertex of each connected part of its surface.
 
-    :param polyhedron: a solid if it is watertight, else a surface that has no inside.
+    :param polyhedron: one solid or several if it is watertight, else a surface without an inside.
     :param part: (P,) indices of vertices.
+    :param triangles: (T, 3) those of the polyhedron, solid by solid.
+    :param first: (S,) where the triangles of each solid begin.
     """
 
     polyhedron: Polyhedron
     part: np.ndarray
+    triangles: np.ndarray
+    first: np.ndarray
 
 
-def probe(polyhedron: Polyhedron) -> Probe:
-    """Return a polyhedron with a vertex of each of its parts."""
+def probe(polyhedron: Polyhedron, solids: np.ndarray | None = None) -> Probe:
+    """
+    Return a polyhedron with a vertex of each of its parts.
+
+    :param polyhedron: the surface.
+    :param solids: (F,) the solid that each face bounds; one if None. What is inside is asked of
+        each by itself: what one winds round could cancel another that is wound the other way.
+    """
     count = len(polyhedron.vertices)
     start, end = polyhedron.edges.T
     joined = coo_array((np.ones(len(start)), (start, end)), shape=(count, count))
     _, part = connected_components(joined, directed=False)
     used = np.unique(polyhedron.edges)
     _, first = np.unique(part[used], return_index=True)
-    return Probe(polyhedron, used[first])
+    owner = np.zeros(len(polyhedron.faces), np.int64) if solids is None else solids
+    owner = owner[polyhedron.triangle_face]
+    order = np.argsort(owner, kind='stable')
+    _, begin = np.unique(owner[order], return_index=True)
+    return Probe(polyhedron, used[first], polyhedron.triangles[order], begin)
 
 
 def surely_apart(moving: Probe, fixed: Probe, curve: Curve, instant: float) -> bool:
@@ -57,19 +71,25 @@ def surely_apart(moving: Probe, fixed: Probe, curve: Curve, instant: float) -> b
     reach = float((largest[:, :3].sum(axis=1) * np.abs(corners).max() + largest[:, 3]).max())
     doubt = 8.0 * (len(curve.weights) + 2.0) * U * reach
     return not (
-        _may_contain(fixed.polyhedron, still, images[moving.part], doubt)
-        or _may_contain(moving.polyhedron, images, still[fixed.part], doubt)
+        _may_contain(fixed, still, images[moving.part], doubt)
+        or _may_contain(moving, images, still[fixed.part], doubt)
     )
 
 
-def _may_contain(solid: Polyhedron, corners: np.ndarray, places: np.ndarray, doubt: float) -> bool:
-    """Say whether one of some places may be inside a polyhedron with its corners there."""
-    if not solid.watertight:
+def _may_contain(outer: Probe, corners: np.ndarray, places: np.ndarray, doubt: float) -> bool:
+    """Say whether one of some places may be inside a solid of a polyhedron with its corners so."""
+    if not outer.polyhedron.watertight:
         return False
-    low, high = corners.min(axis=0) - doubt, corners.max(axis=0) + doubt
+    own = corners[outer.triangles]
+    low = np.minimum.reduceat(own.min(axis=1), outer.first) - doubt
+    high = np.maximum.reduceat(own.max(axis=1), outer.first) + doubt
+    solids = np.split(outer.triangles, outer.first[1:])
     # Written so that a NaN is near.
-    near = places[~((places < low) | (places > high)).any(axis=1)]
-    return any(may_contain(corners, solid.triangles, True, place, doubt) for place in near)
+    return any(
+        may_contain(corners, solids[i], True, place, doubt)
+        for place in places
+        for i in np.flatnonzero(~((place < low) | (place > high)).any(axis=1))
+    )
 
 
 def pose_at(curve: Curve, instant: float) -> np.ndarray:

@@ -36,6 +36,7 @@ def pair_of(
     *,
     individual: bool = True,
     moments: np.ndarray | None = None,
+    solids: np.ndarray | None = None,
 ) -> Pair:
     """
     Prepare two polyhedra.
@@ -46,8 +47,10 @@ def pair_of(
         and over its barycentre; or all have the sum of these.
     :param moments: (4, 4) matrix G = sum of w_i [m_i; 1] [m_i; 1]^T of the distribution for all
         [m^2].
+    :param solids: (F,) int, which of several solids each fixed face bounds; they may overlap, but
+        share no vertex. One if None.
     :raises RequestError: moments is not a finite (4, 4) matrix of positive mass, or given for
-        individual distributions.
+        individual distributions; solids has another shape or a vertex in common.
     """
     whole = None
     if moments is not None:
@@ -57,10 +60,28 @@ def pair_of(
         if G.shape != (4, 4) or not np.isfinite(G).all() or not G[3, 3] > 0.0:
             raise _invalid(f'moments must be (4, 4), finite, of positive mass, got {G.tolist()}')
         whole = given_moments(G)
+    if solids is not None:
+        _check_solids(fixed, solids)
     own = surface(moving)
     metric = node_metric(own, individual, whole)
-    probes = probe(moving), probe(fixed)
+    probes = probe(moving), probe(fixed, solids)
     return Pair(moving, fixed, Packed(own, surface(fixed), metric), probes)
+
+
+def _check_solids(fixed: Polyhedron, solids: np.ndarray) -> None:
+    """Solids without a common vertex are closed if all together are."""
+    count = len(fixed.faces)
+    if solids.shape != (count,) or solids.dtype.kind not in 'iu':
+        raise _invalid(
+            f'solids must be integers of shape ({count},), got {solids.dtype} {solids.shape}'
+        )
+    corners = fixed.triangles.ravel()
+    owner = np.repeat(solids[fixed.triangle_face], 3)
+    one = np.empty(len(fixed.vertices), owner.dtype)
+    one[corners] = owner
+    wrong = one[corners] != owner
+    if wrong.any():
+        raise _invalid(f'solids have vertex {corners[wrong.argmax()]} in common')
 
 
 def _invalid(message: str) -> RequestError:
