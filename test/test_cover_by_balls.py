@@ -26,6 +26,7 @@ from trajectory_guard.result import Status, Verdict
 from trajectory_guard.scene import Obstacle, Scene
 from trajectory_guard.settings import Cover, Scope, Settings
 from trajectory_guard.surface import Surface
+from trajectory_guard.toleranced.collision import collide
 from trajectory_guard.toleranced.pair import pair_of
 from trajectory_guard.trajectory import JointState, Point, Trajectory
 from trajectory_guard.urdf import robot_from_urdf
@@ -369,3 +370,22 @@ def test_open_meshes_are_told_of_as_by_the_hull() -> None:
         result = certify(work, standing(0.0), Settings(cover=cover))
         assert result.verdict is Verdict.FREE
         assert result.warnings == ('open meshes, so nothing counts as inside: bin',)
+
+
+@pytest.mark.parametrize(
+    ('given', 'told'),
+    [
+        ({'stop': np.zeros(0, np.int64)}, 'stop must be int64'),
+        ({'stop': np.zeros(1)}, 'stop must be int64'),
+        ({'max_tests': 1e6}, 'max_tests must be a whole number'),
+        ({'max_depth': -1}, 'max_depth must be a whole number'),
+        ({'individual': False, 'moments': np.diag([1e308, 1.0, 1.0, 1e-300])}, 'not finite'),
+    ],
+)
+def test_what_the_kernels_could_not_take_is_refused(given: dict, told: str) -> None:
+    """A flag without an entry would be read out of bounds, infinite moments end no search."""
+    one = faceted(BODIES['box']).polyhedron
+    still = RationalMotion(np.eye(3, 4)[None], np.ones(1))
+    with pytest.raises(RequestError, match=told) as caught:
+        collide(one, one, still, epsilon=1e-3, **given)
+    assert caught.value.reason is Reason.INVALID_PARAMETER

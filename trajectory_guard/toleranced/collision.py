@@ -135,11 +135,13 @@ def collisions(
         ('max_tests', max_tests, 1),
         ('threads', threads, 1),
     ):
-        if not value >= least:
-            raise _invalid(f'{name} must be >= {least}, got {value}')
+        if not (isinstance(value, int | np.integer) and value >= least):
+            raise _invalid(f'{name} must be a whole number >= {least}, got {value!r}')
     if max_depth > DEEPEST:
         raise _invalid(f'max_depth must be <= {DEEPEST}, got {max_depth}')
     flag = np.zeros(1, np.int64) if stop is None else stop
+    if flag.shape != (1,) or flag.dtype != np.int64:
+        raise _invalid(f'stop must be int64 of shape (1,), got {flag.dtype} of shape {flag.shape}')
     errors = errors_of(motion)
     tests = min(max_tests, MOST_TESTS)
     limits = Limits(clearance, *errors, epsilon, max_depth, tests, not hierarchy, adapted)

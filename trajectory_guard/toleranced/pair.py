@@ -59,7 +59,10 @@ def pair_of(
             raise _invalid('moments are for one distribution, not for individual ones')
         if G.shape != (4, 4) or not np.isfinite(G).all() or not G[3, 3] > 0.0:
             raise _invalid(f'moments must be (4, 4), finite, of positive mass, got {G.tolist()}')
-        whole = given_moments(G)
+        with np.errstate(over='ignore', invalid='ignore'):
+            whole = given_moments(G)
+        if not (np.isfinite(whole.barycentre).all() and np.isfinite(whole.inertia).all()):
+            raise _invalid(f'moments over their mass are not finite: {G.tolist()}')
     if solids is not None:
         _check_solids(fixed, solids)
     own = surface(moving)
