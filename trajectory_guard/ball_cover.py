@@ -103,19 +103,15 @@ class BallCell:
 
 def _grouped(obstacles: list[Faceted]) -> tuple[Targets, ...]:
     """Return the obstacles in few polyhedra: solids and surfaces apart, and each large ball."""
-    groups: dict[object, list[int]] = {}
+    groups: dict[tuple[bool, float], list[int]] = {}
     for o, (polyhedron, ball) in enumerate(obstacles):
         exact = ball <= ROUNDING * float(np.ptp(polyhedron.vertices, axis=0).max())
-        groups.setdefault(polyhedron.watertight if exact else ball, []).append(o)
+        groups.setdefault((polyhedron.watertight, 0.0 if exact else ball), []).append(o)
     targets = []
     for members in groups.values():
-        # Balls of one size may belong to a solid and to a surface.
-        for closed in (True, False):
-            some = [o for o in members if obstacles[o].polyhedron.watertight is closed]
-            if some:
-                polyhedron, owner = joined([obstacles[o].polyhedron for o in some])
-                ball = max(obstacles[o].ball for o in some)
-                targets.append(Targets(polyhedron, ball, np.array(some)[owner]))
+        polyhedron, owner = joined([obstacles[o].polyhedron for o in members])
+        ball = max(obstacles[o].ball for o in members)
+        targets.append(Targets(polyhedron, ball, np.array(members)[owner]))
     return tuple(targets)
 
 

@@ -140,9 +140,9 @@ inline double lower_bound(const Quadratic& f, Domain domain, Parameters& where) 
   double sides = least_on_sides(f, domain, where);
   double both = f.ss * f.tt, square = f.st * f.st;
   // Concave along s or t, or indefinite: no interior point is least.
-  if (!(f.ss > 0.0 && f.tt > 0.0) || square > both * (1.0 + 8.0 * UNIT_ROUNDOFF))
-    return sides - margin;
+  if (!(f.ss > 0.0 && f.tt > 0.0)) return sides - margin;
   if (!(both > SMALLEST_PRODUCT)) return -INFINITY;
+  if (square > both * (1.0 + 8.0 * UNIT_ROUNDOFF)) return sides - margin;
   double best = least_of_tangent(f, domain, where), determinant = both - square;
   if (!(determinant > 0.0)) return best - margin;
   Parameters inside{(f.st * f.t - f.tt * f.s) / determinant,
