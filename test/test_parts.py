@@ -1,12 +1,16 @@
 """Clusters of faces: each contains its faces, both halves make the whole, leaves are triangles."""
 
-from meshes import extruded, ring, U
+from fractions import Fraction
+
+from meshes import extruded, ring
+from meshes import U as U_SHAPE
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from trajectory_guard import parts
+from trajectory_guard.body import rigid_defect, RIGID_TOLERANCE, U
 from trajectory_guard.kernels.layout import (
     BALL,
     BOX,
@@ -25,6 +29,7 @@ from trajectory_guard.kernels.layout import (
 from trajectory_guard.mesh import mesh_body
 from trajectory_guard.mesh_formats import Triangles
 from trajectory_guard.parts import Clusters
+from trajectory_guard.surface import Surface
 
 
 def moved(mesh, seed=0):
@@ -48,7 +53,7 @@ def surface(request):
         rng = np.random.default_rng(5)
         triangles = np.array([rng.choice(60, 3) for _ in range(200)])
         return moved(Triangles(rng.normal(size=(60, 3)), triangles))
-    return moved(extruded(U) if request.param == 'U' else ring())
+    return moved(extruded(U_SHAPE) if request.param == 'U' else ring())
 
 
 def test_every_cluster_contains_its_faces(surface):
@@ -72,6 +77,35 @@ def test_every_cluster_contains_its_faces(surface):
             hull = ConvexHull(vertices, qhull_options='QJ Pp')
             height = corners @ hull.equations[:, :3].T + hull.equations[:, 3]
             assert height.max() < 1e-9
+
+
+@pytest.mark.parametrize('sign', [-1.0, 1.0])
+def test_a_box_contains_its_faces_however_square_its_axes_are(sign):
+    """As far from a rotation as a pose may be, and that along the diagonal."""
+    diagonal = np.full((3, 3), 1.0 / np.sqrt(3.0))
+    frame = np.linalg.qr(diagonal + np.diag([0.0, 1.0, 2.0]))[0]
+    T = np.eye(4)
+    T[:3, :3] = frame + sign * 20.5 * U * np.ones((3, 3)) @ frame
+    rng = np.random.default_rng(1)
+    points = rng.uniform(-1e-9, 1e-9, (120, 3))
+    T[:3, 3] = 1.0
+    triangles = np.arange(120).reshape(-1, 3)
+    assert rigid_defect(T) <= RIGID_TOLERANCE
+    found = Surface(points, triangles).moved(T)
+    clusters = Clusters(found)
+    solids, spans = clusters.below(np.array([[0, len(triangles)]]))
+    for place, row, span in zip(solids.place[:2], solids.ranges[:2], spans[:2], strict=True):
+        vertices = solids.vertices[:, row[FIRST] : row[LAST]].T.tolist()
+        corners = faces_of(clusters, found, span).reshape(-1, 3).tolist()
+        for axis in place[BOX:].reshape(3, 4)[:, :3].T.tolist():
+            heights = [height(axis, v) for v in vertices]
+            for x in corners:
+                assert min(heights) <= height(axis, x) <= max(heights)
+
+
+def height(axis, x):
+    """Return the exact product of two vectors."""
+    return sum(Fraction(a) * Fraction(b) for a, b in zip(axis, x, strict=True))
 
 
 def test_halves_make_the_whole_down_to_triangles(surface):

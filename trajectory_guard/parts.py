@@ -91,9 +91,10 @@ class Clusters:
         """
         Return solids that contain the faces of the spans.
 
-        A sphere contains the points themselves. The box has the axes of the mesh; as whatever is
+        A sphere contains the points themselves. The box has the axes T of the mesh; as whatever is
         computed with them rounds, and they are square to each other only within rounding, its
-        sides are widened.
+        sides are widened. With no entry of T T^T - I above d and no coordinate of x above s, T T^T
+        x is off x by 3 sqrt(3) d s at most, so x leaves the box of T^T x by less than 6 d s.
         """
         at, of, _ = _members(spans)
         corners = self._triangles[self._order[at]]
@@ -107,7 +108,7 @@ class Clusters:
         defect = np.abs(self._turn @ self._turn.T - np.eye(3)).max()
         local = x @ self._turn
         low, high = np.minimum.reduceat(local, starts), np.maximum.reduceat(local, starts)
-        half = 0.5 * (high - low) * UP + (3.0 * defect + 64.0 * U) * scale
+        half = 0.5 * (high - low) * UP + (6.0 * defect + 64.0 * U) * scale
         middle = 0.5 * (low + high) @ self._turn.T
         boxed = middle[:, None] + (BOX_CORNERS * half[:, None]) @ self._turn.T
         big = counts > MOST_POINTS
