@@ -19,7 +19,8 @@ class FreePath:
     Segment i runs over [knots_ns[i], knots_ns[i + 1]]; there the child frame in its parent frame
     is motions[i] at s = (t - knots_ns[i]) / (knots_ns[i + 1] - knots_ns[i]), and at every instant
     every point x of the child frame is within shift_error[i] + turn_error[i] |x| of where that
-    puts it. Segments need not join: at a knot both poses count.
+    puts it. Segments need not join: both poses at a knot are looked at, and an interval
+    that ends there speaks of the one before.
 
     :param joint_name: the floating joint, or the body.
     :param knots_ns: (S + 1,) int64, strictly increasing [ns]; a pose without motion is one
