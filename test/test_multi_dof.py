@@ -439,3 +439,13 @@ def test_poses_in_another_frame_are_refused_by_name(frame_id: str, verdict: str)
         assert repr(frame_id) in result.message
     (document,) = documents(json.dumps(plain(told)))
     assert document.trajectory.frame_id == frame_id
+
+
+def test_a_frame_that_the_joints_origin_makes_another_is_refused() -> None:
+    origin = '<origin xyz="0 0 1"/></joint>'
+    robot = robot_from_urdf(CART.replace('</joint>', origin))
+    scene = Scene((Obstacle('box', (Box((0.2, 0.2, 0.2)).load().body,)),), '')
+    poses = [point(0, (3, 0, 0)), point(SECOND, (4, 0, 0))]
+    for frame_id, reason in (('', ''), ('map', 'frame_unknown')):
+        told = MultiDofTrajectory.from_points(('base',), poses, frame_id=frame_id)
+        assert judge(Workcell(robot, scene), told).reason_code == reason

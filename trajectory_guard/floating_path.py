@@ -49,8 +49,9 @@ def floating_joint_in(robot: Robot, names: Sequence[str], frame_id: str = '') ->
     """
     Return which of a message's joints is the robot's floating one: it must be the only one.
 
-    Poses are those of the joint: its child link in the joint's own frame, which hangs on the
-    parent link; so the message's frame is the parent link. A bare body has none.
+    Poses are those of the joint: its child link in the joint's own frame. A message that names a
+    frame names the parent link, and the joint then has no origin of its own there. A bare body
+    is in any frame.
 
     :param robot: the robot.
     :param names: the message's.
@@ -70,12 +71,20 @@ def floating_joint_in(robot: Robot, names: Sequence[str], frame_id: str = '') ->
         raise TrajectoryError(
             Reason.UNKNOWN_JOINT, f'poses of {only} are expected, the message has {told}'
         )
-    (parent,) = (j.parent for j in robot.joints if j.type is JointType.TRANSLATION)
-    if own != ANY_NAME and frame_id.removeprefix('/') not in ('', parent):
-        raise TrajectoryError(
-            Reason.FRAME_UNKNOWN,
-            f'frame_id is {frame_id!r}; joint {own!r} has its poses in {parent!r}',
-        )
+    (joint,) = (j for j in robot.joints if j.type is JointType.TRANSLATION)
+    frame = frame_id.removeprefix('/')
+    if own != ANY_NAME and frame:
+        if frame != joint.parent:
+            raise TrajectoryError(
+                Reason.FRAME_UNKNOWN,
+                f'frame_id is {frame_id!r}; joint {own!r} has its poses in {joint.parent!r}',
+            )
+        if (joint.T_parent_joint != np.eye(4)).any():
+            raise TrajectoryError(
+                Reason.FRAME_UNKNOWN,
+                f'frame_id is {frame_id!r}, but joint {own!r} has an origin of its own there, and '
+                'poses are those of the joint; leave frame_id empty',
+            )
     return 0
 
 
