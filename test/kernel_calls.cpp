@@ -342,8 +342,8 @@ int64_t call_layout(char* text, int64_t room) {
   FIELD(Extents, extent), FIELD(Extents, perpendicular), FIELD(Extents, offsets);
   SIZE(Request);
   FIELD(Request, tolerance), FIELD(Request, clearance), FIELD(Request, max_pieces);
-  FIELD(Request, scope), FIELD(Request, want_proof), FIELD(Request, bodies);
-  FIELD(Request, body_count);
+  FIELD(Request, scope), FIELD(Request, want_proof), FIELD(Request, sharpen);
+  FIELD(Request, bodies), FIELD(Request, body_count);
   SIZE(Answer);
   FIELD(Answer, leaf_count), FIELD(Answer, entry_count), FIELD(Answer, piece_count);
   FIELD(Answer, opened_count), FIELD(Answer, wanted_count);

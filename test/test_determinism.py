@@ -93,7 +93,11 @@ def test_what_is_not_written_down_changes_nothing(robot, scope):
     for budget in (5, SETTINGS.max_pieces):
         for trajectory, _, _ in cases(robot):
             settings = dataclasses.replace(
-                SETTINGS, scope=scope, tracking_tolerance=(TRACKING,), max_pieces=budget
+                SETTINGS,
+                scope=scope,
+                tracking_tolerance=(TRACKING,),
+                max_pieces=budget,
+                refine=False,
             )
             short = judge(cell, trajectory, None, settings)
             whole = judge(

@@ -133,6 +133,7 @@ def expected(workcell: Workcell, asked: CertifyTrajectory.Request) -> Result:
         tolerance=asked.tolerance or MINIMUM.tolerance,
         clearance=asked.clearance or MINIMUM.clearance,
         tracking_tolerance=tuple(value or MINIMUM.tracking_tolerance[0] for value in values),
+        want_certificate=asked.want_certificate,
     )
     start = joint_state_from_message(asked.start_state) if asked.start_state.name else None
     return timeless(judge(workcell, trajectory_from_message(asked.trajectory), start, settings))
@@ -166,7 +167,7 @@ def test_certificate_is_that_of_the_library(
 ) -> None:
     asked = request(HIT, want_certificate=True)
     response = ask.ask('arm', asked)
-    assert timeless(result_from_message(response.result)) == expected(workcell, request(HIT))
+    assert timeless(result_from_message(response.result)) == expected(workcell, asked)
     trajectory = trajectory_from_message(asked.trajectory)
     settings = dataclasses.replace(MINIMUM, want_certificate=True)
     assert response.certificate == text(judge(workcell, trajectory, None, settings).certificate)

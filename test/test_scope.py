@@ -124,7 +124,10 @@ def test_a_spent_budget_keeps_what_was_proved(robot, scope, budget):
             if row.status == Status.FREE:
                 assert inside(row, [r for r in whole.intervals if r.status == Status.FREE])
         reasons = {row.reason for row in part.intervals if row.status == Status.SUSPECT}
-        assert Reason.BUDGET.value in reasons or scope != Scope.ALL
+        # A closer look that is cut short leaves what was suspect for another reason.
+        rough = asked(cell, trajectory, scope, refine=False)
+        complete = rough.pieces <= budget
+        assert Reason.BUDGET.value in reasons or scope != Scope.ALL or complete
 
 
 @pytest.mark.parametrize('scope', Scope)

@@ -56,6 +56,7 @@ def _cover(
         settings.scope,
         settings.want_certificate,
         stop,
+        sharpen=settings.refine,
     )
 
 

@@ -63,6 +63,8 @@ class Settings:
     :param max_pieces: motion pieces that may be examined; the rest is *suspect*.
     :param scope: how much of the motion is asked about.
     :param cover: how the motion is enclosed.
+    :param refine: look closer at suspect intervals, down to what rounding allows: contacts of
+        polyhedra then begin and end within nanoseconds or so; not where a certificate is wanted.
     :param want_certificate: write down what proves each answer.
     :param allowed_start_tolerance: start state against a point 0 at time 0 [rad or m].
     :param joint_limit_tolerance: how far the curve may leave the joint limits [rad or m].
@@ -78,6 +80,7 @@ class Settings:
     max_pieces: int = 200_000
     scope: Scope = Scope.ALL
     cover: Cover = Cover.HULL
+    refine: bool = True
     want_certificate: bool = False
     allowed_start_tolerance: float = 0.01
     joint_limit_tolerance: float = 1e-6

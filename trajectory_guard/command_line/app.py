@@ -52,6 +52,7 @@ def check(
     deadline: options.Deadline = None,
     scope: options.ScopeOption = _DEFAULTS.scope,
     cover: options.CoverOption = _DEFAULTS.cover,
+    refine: options.Refine = _DEFAULTS.refine,
     certificate: options.Certificate = None,
     json: options.Json = False,
 ) -> None:
@@ -63,6 +64,7 @@ def check(
         deadline_ns=deadline,
         scope=scope,
         cover=cover,
+        refine=refine,
         want_certificate=certificate is not None,
         check_joint_limits=not no_joint_limits,
         allow_nonzero_end_velocity=allow_end_velocity,
@@ -100,6 +102,7 @@ def replay(
     deadline: options.Deadline = None,
     scope: options.ScopeOption = _DEFAULTS.scope,
     cover: options.CoverOption = _DEFAULTS.cover,
+    refine: options.Refine = _DEFAULTS.refine,
     certificate: options.Certificate = None,
     json: options.Json = False,
 ) -> None:
@@ -111,6 +114,7 @@ def replay(
         deadline_ns=deadline,
         scope=scope,
         cover=cover,
+        refine=refine,
         want_certificate=certificate is not None,
         check_joint_limits=not no_joint_limits,
         allow_nonzero_end_velocity=allow_end_velocity,

@@ -247,6 +247,13 @@ CoverOption = Annotated[
         help='How motions are enclosed: by hulls and planes, or by balls of displacements.',
     ),
 ]
+Refine = Annotated[
+    bool,
+    typer.Option(
+        '--refine/--no-refine',
+        help='Look closer at suspect intervals, down to what rounding allows.',
+    ),
+]
 Json = Annotated[
     bool, typer.Option('--json', help='Print one JSON object a line for each trajectory.')
 ]

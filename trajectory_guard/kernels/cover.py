@@ -69,6 +69,8 @@ def cover(
     scope: int,
     want_proof: bool,
     stop: np.ndarray,
+    *,
+    sharpen: bool = False,
 ) -> Covered:
     """
     Cover all segments of one path; see :func:`cover_all`.
@@ -84,6 +86,7 @@ def cover(
         scope,
         want_proof,
         stop,
+        sharpen=sharpen,
     )
     if covered is None:
         raise KernelRefused
@@ -99,6 +102,8 @@ def cover_all(
     scope: int,
     want_proof: bool,
     stop: np.ndarray,
+    *,
+    sharpen: bool = False,
 ) -> list[Covered | None]:
     """
     Cover all segments of several paths in one call, without the interpreter's lock.
@@ -111,12 +116,13 @@ def cover_all(
     :param scope: a `settings.Scope`.
     :param want_proof: whether to write down what closed each pair.
     :param stop: (1,) int64; another thread sets it non-zero to have the rest given up.
+    :param sharpen: whether to look closer at what is suspect, if no proof is wanted.
     :returns: what was found of each path; None if it is out of range.
     :raises MemoryError: there is not enough.
     """
     count = len(questions)
     paths = (PathStructure * count)(*(path_structure(path) for path, _ in questions))
-    limits = (tolerance, clearance, max_pieces, scope, want_proof)
+    limits = (tolerance, clearance, max_pieces, scope, want_proof, sharpen)
     requests = (Request * count)(
         *(Request(*limits, address(bodies), len(bodies)) for _, bodies in questions)
     )

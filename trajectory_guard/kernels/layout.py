@@ -211,6 +211,7 @@ Request = _structure(
     max_pieces=_I,
     scope=_I,
     want_proof=_I,
+    sharpen=_I,
     bodies=_P,
     body_count=_I,
 )

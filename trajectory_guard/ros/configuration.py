@@ -83,6 +83,7 @@ class Configuration:
                 deadline_ns=round(values['deadline'] * NANOSECONDS),
                 max_pieces=values['max_pieces'],
                 cover=Cover.named(values['cover']),
+                refine=values['refine'],
                 allowed_start_tolerance=values['allowed_start_tolerance'],
                 joint_limit_tolerance=values['joint_limit_tolerance'],
                 check_joint_limits=values['check_joint_limits'],

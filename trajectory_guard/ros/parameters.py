@@ -79,6 +79,9 @@ DECLARATIONS = {
         _DEFAULTS.cover.name.lower(),
         'how motions are enclosed: hull, or ball, which proves no collisions and is slower',
     ),
+    'refine': Declaration(
+        _DEFAULTS.refine, 'look closer at suspect intervals, down to what rounding allows'
+    ),
     'allowed_start_tolerance': Declaration(
         _DEFAULTS.allowed_start_tolerance,
         'how far the start state may be off a first point at time 0 [rad or m]',
