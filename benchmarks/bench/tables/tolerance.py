@@ -65,7 +65,7 @@ def tolerance(benches: list[Bench]) -> Iterator[dict]:
 def sweep(bench: Bench) -> dict[tuple[Scope, float], list[Found]]:
     """Return what was found for every colliding case, by what was asked."""
     asked = {
-        (scope, t): settings(scope=scope, tolerance=t)
+        (scope, t): settings(scope=scope, tolerance=t, refine=False)
         for scope in (Scope.ALL, Scope.FIRST)
         for t in TOLERANCES
     }
