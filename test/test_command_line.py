@@ -110,7 +110,7 @@ def test_a_free_trajectory_is_reported_and_exits_zero(cell: Cell) -> None:
     assert run.exit_code == 0
     assert run.stderr == ''
     assert run.stdout.startswith(f'{cell.folder}/plan.yaml: FREE\n')
-    assert '0.000000   1.000000   free' in run.stdout
+    assert '0.000000000   1.000000000   free' in run.stdout
     assert 'not checked: links of the robot against each other' in run.stdout
     assert '\x1b' not in run.stdout
 

@@ -16,7 +16,7 @@ from trajectory_guard.result import Interval, NANOSECONDS, Result, Status, Verdi
 MAX_ROWS = 40
 
 # Below this many columns what belongs to a pair shares one column.
-_WIDE = 100
+_WIDE = 110
 
 _MILLIMETRES = 1e3
 _MILLISECONDS = 1e3
@@ -160,10 +160,13 @@ def _place(row: Interval) -> str:
 
 
 def _seconds(time_ns: int) -> str:
-    """Return a time to the microsecond [s]."""
-    return f'{time_ns / NANOSECONDS:.6f}'
+    """Return a time, exactly: contacts may begin and end within nanoseconds [s]."""
+    return f'{time_ns // NANOSECONDS}.{time_ns % NANOSECONDS:09d}'
 
 
 def _bound(length: float | None) -> str:
-    """Return a bound of a gap [mm]."""
-    return '?' if length is None else f'{length * _MILLIMETRES:.3f}'
+    """Return a bound of a gap, to the micrometre or one digit [mm]."""
+    if length is None:
+        return '?'
+    value = length * _MILLIMETRES
+    return f'{value:.3f}' if abs(value) >= 1e-3 or value == 0.0 else f'{value:.0e}'
