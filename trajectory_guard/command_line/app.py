@@ -36,7 +36,8 @@ def check(
         list[Path],
         typer.Argument(
             metavar='TRAJECTORY',
-            help='JointTrajectory as YAML or JSON (`ros2 topic echo --full-length`), or a bag.',
+            help='(MultiDOF)JointTrajectory as YAML or JSON '
+            '(`ros2 topic echo --full-length`), or a bag.',
         ),
     ],
     urdf: options.Urdf,

@@ -259,7 +259,7 @@ Json = Annotated[
 ]
 Topics = Annotated[
     list[str] | None,
-    typer.Option(metavar='NAME', help='JointTrajectory topic; may be repeated. [default: all]'),
+    typer.Option(metavar='NAME', help='Trajectory topic; may be repeated. [default: all]'),
 ]
 JointStates = Annotated[
     list[str] | None,
