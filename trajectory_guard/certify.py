@@ -11,7 +11,7 @@ import numpy as np
 from trajectory_guard.certificate import certificate
 from trajectory_guard.deadline import stop_flag
 from trajectory_guard.errors import Reason, RequestError, TrajectoryGuardError
-from trajectory_guard.floating_path import floating_joint_in, floating_path
+from trajectory_guard.floating_path import check_floating_joint, floating_path
 from trajectory_guard.free_path import FreePath
 from trajectory_guard.joint_path import joint_path, JointPath
 from trajectory_guard.kernels.cover import Covered, Question
@@ -182,9 +182,9 @@ def _poses_path(
         raise RequestError(
             Reason.INVALID_PARAMETER, 'certificates are written of joint trajectories only'
         )
-    joint = floating_joint_in(workcell.robot, trajectory.joint_names, trajectory.frame_id)
+    check_floating_joint(workcell.robot, trajectory.joint_names, trajectory.frame_id)
     free = multi_dof_path(
-        trajectory, joint, allow_nonzero_end_velocity=settings.allow_nonzero_end_velocity
+        trajectory, allow_nonzero_end_velocity=settings.allow_nonzero_end_velocity
     )
     return floating_path(workcell.robot, free, start)
 

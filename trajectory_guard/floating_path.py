@@ -26,7 +26,7 @@ def floating_path(robot: Robot, free: FreePath, start: JointState | None = None)
     :raises TrajectoryError: the robot has no floating joint, or one of another name, or a joint's
         position is unknown.
     """
-    floating_joint_in(robot, (free.joint_name,))
+    check_floating_joint(robot, (free.joint_name,))
     joints = robot.movable
     coefficients = np.zeros((len(free.motions), len(joints), 6))
     error = np.zeros((len(free.motions), len(joints)))
@@ -45,9 +45,9 @@ def floating_path(robot: Robot, free: FreePath, start: JointState | None = None)
     )
 
 
-def floating_joint_in(robot: Robot, names: Sequence[str], frame_id: str = '') -> int:
+def check_floating_joint(robot: Robot, names: Sequence[str], frame_id: str = '') -> None:
     """
-    Return which of a message's joints is the robot's floating one: it must be the only one.
+    Refuse poses that are not those of the robot's floating joint and nothing else.
 
     Poses are those of the joint: its child link in the joint's own frame. A message that names a
     frame names the parent link, and the joint then has no origin of its own there. A bare body
@@ -85,7 +85,6 @@ def floating_joint_in(robot: Robot, names: Sequence[str], frame_id: str = '') ->
                 f'frame_id is {frame_id!r}, but joint {own!r} has an origin of its own there, and '
                 'poses are those of the joint; leave frame_id empty',
             )
-    return 0
 
 
 def _held(joints: Sequence[Joint], start: JointState | None) -> list[float]:

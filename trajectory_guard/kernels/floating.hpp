@@ -104,7 +104,8 @@ inline double spectral_norm(const Columns& c) {
   double most = 0.0;
   for (int i = 0; i < 3; i++) {
     double row = a[i][i] + std::fabs(a[i][(i + 1) % 3]) + std::fabs(a[i][(i + 2) % 3]);
-    if (!(row <= most)) most = row;
+    if (row != row) return NAN;
+    if (row > most) most = row;
   }
   return std::sqrt(most + 1000.0 * UNIT_ROUNDOFF * trace) * UP;
 }
