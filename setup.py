@@ -38,5 +38,10 @@ setup(
     python_requires='>=3.10,<3.14',
     install_requires=requirements('runtime'),
     zip_safe=False,
-    entry_points={'console_scripts': ['guard = trajectory_guard.ros.guard:main']},
+    entry_points={
+        'console_scripts': [
+            'gate = trajectory_guard.ros.gate:main',
+            'guard = trajectory_guard.ros.guard:main',
+        ]
+    },
 )

@@ -186,6 +186,17 @@ def test_scope_says_how_much_is_asked(guard: GuardProcess, ask: Asker) -> None:
     assert 'scope' in wrong.message
 
 
+def test_a_request_says_whether_to_look_closer(guard: GuardProcess, ask: Asker) -> None:
+    narrow, wide = (
+        ask.result('arm', request(HIT, refine=value)).intervals
+        for value in (CertifyTrajectory.Request.REFINE_ON, CertifyTrajectory.Request.REFINE_OFF)
+    )
+    assert narrow == ask.result('arm', request(HIT)).intervals != wide
+    wrong = ask.result('arm', request(FREE, refine=3))
+    assert (wrong.verdict, wrong.reason_code) == (Verdict.REJECTED, Reason.INVALID_PARAMETER)
+    assert 'refine' in wrong.message
+
+
 def test_deadline_leaves_a_suspect(guard: GuardProcess, ask: Asker) -> None:
     result = ask.result('arm', request(back_and_forth(1000), deadline=Duration(nanosec=1)))
     assert result.verdict is not Verdict.FREE

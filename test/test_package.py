@@ -15,7 +15,13 @@ from xml.etree import ElementTree
 from ament_index_python import get_package_prefix, get_package_share_directory
 import pytest
 import setuptools
-from trajectory_guard_interfaces.msg import CertificationResult, TimeInterval
+from trajectory_guard_interfaces.msg import (
+    CertificationResult,
+    GateDecision,
+    GateStatus,
+    GuardStatus,
+    TimeInterval,
+)
 from trajectory_guard_interfaces.srv import CertifyTrajectory
 
 from trajectory_guard.result import Status, Verdict
@@ -126,6 +132,7 @@ def test_fields() -> None:
         'tracking_tolerance': 'sequence<double>',
         'deadline': 'builtin_interfaces/Duration',
         'scope': 'uint8',
+        'refine': 'uint8',
         'want_certificate': 'boolean',
     }
     assert CertifyTrajectory.Response.get_fields_and_field_types() == {
@@ -139,6 +146,9 @@ def test_untouched_messages_certify_nothing() -> None:
     answer = CertifyTrajectory.Response().result
     assert answer.verdict == CertificationResult.REJECTED == 0 != CertificationResult.FREE
     assert answer.intervals == []
+    assert GateDecision().decision == GateDecision.HELD == 0 != GateDecision.PASSED
+    assert not GateStatus().ready
+    assert not GuardStatus().ready
 
 
 @pytest.mark.parametrize('member', Status)

@@ -18,6 +18,9 @@ from trajectory_guard.trajectory import JointState, Trajectory
 # The seconds of a Duration are an int32, and the answer gives the times back as Durations.
 LAST_INSTANT_NS = 2**31 * NANOSECONDS - 1
 
+# Values of the field `refine` of a request.
+REFINE_DEFAULT, REFINE_ON, REFINE_OFF = range(3)
+
 
 class Question(NamedTuple):
     """
@@ -96,6 +99,7 @@ def _settings(request: Any, joint_names: Sequence[str], configuration: Configura
         ),
         deadline_ns=nanoseconds_from_message(request.deadline) or least.deadline_ns,
         scope=_scope(request.scope),
+        refine=_refine(request.refine, least.refine),
         want_certificate=bool(request.want_certificate),
     )
     # Settings have refused what is negative or NaN by now.
@@ -125,6 +129,16 @@ def _scope(value: int) -> Scope:
             Reason.INVALID_PARAMETER,
             f'scope must be one of {", ".join(f"{s} ({s.name})" for s in Scope)}, got {value}',
         ) from None
+
+
+def _refine(value: int, default: bool) -> bool:
+    """Return whether to look closer at suspect intervals."""
+    meanings = {REFINE_DEFAULT: default, REFINE_ON: True, REFINE_OFF: False}
+    if value not in meanings:
+        raise RequestError(
+            Reason.INVALID_PARAMETER, f'refine must be one of {[*meanings]}, got {value}'
+        )
+    return meanings[value]
 
 
 def _tracking_tolerance(asked: Sequence[float], least: Sequence[float]) -> tuple[float, ...]:
