@@ -100,3 +100,14 @@ def test_growth_counts_constraints(monkeypatch):
     # Two tetrahedra: 6 * 6 edges, 4 * 4 vertices and faces twice.
     assert rows[0]['constraints'] == 36 + 16 + 16
     assert all(row['us'] > 0 and row['built'] <= row['constraints'] for row in rows)
+
+
+def test_contacts_of_real_robots_are_pinned():
+    """Entry and exit to a microsecond, whatever the machine's speed."""
+    rows = list(algebraic.pin())
+    assert [row['contacts'] for row in rows] == [12] * 3 + [13] * 3
+    by_way = {(row['robot'], row['asked']): row for row in rows}
+    for robot in ('panda', 'ur5'):
+        rough, fine = (by_way[robot, way] for way in ('tolerance 0.1 mm', 'refine'))
+        assert fine['open_ns'] <= 1000 < rough['open_ns']
+        assert by_way[robot, 'refine, contacts named']['contact_ns'] < 1.0

@@ -390,6 +390,34 @@ def test_a_certificate_that_cannot_be_written_is_bad_input(cell: Cell, target: s
     assert not list(cell.folder.glob('.*'))
 
 
+def test_contacts_are_named(cell: Cell) -> None:
+    run = cell.check(HIT, '--contacts')
+    assert run.exit_code == 1
+    begins, ends = (line for line in run.stdout.splitlines() if 'contact ' in line)
+    # Each side of the arm meets an upright edge of the post along an edge.
+    assert 'contact begins at 1.' in begins
+    assert 'contact ends at 1.' in ends
+    assert 'ns): fore - post, edge of the link, ' in begins
+    (result,) = cell.results(HIT, '--contacts')
+    for contact, suspect in zip(result['contacts'], result['intervals'][1::2], strict=True):
+        assert suspect['start'] <= contact['latest']
+        assert contact['earliest'] <= suspect['end']
+
+
+@pytest.mark.parametrize(
+    ('options', 'said'),
+    [
+        (('--contacts', '--clearance', 0.01), 'contacts are named without clearance'),
+        (('--cover', 'ball', '--certificate', 'x.json'), 'certificates are written of the cover'),
+    ],
+)
+def test_options_that_do_not_go_together(cell: Cell, options: Any, said: str) -> None:
+    run = cell.check(FREE, *options)
+    assert run.exit_code == 2
+    assert said in ' '.join(run.stderr.split())
+    assert 'Traceback' not in run.stderr
+
+
 def test_scope_leaves_the_rest_unexamined(cell: Cell) -> None:
     (whole,), (first,), (verdict,) = (
         cell.results(HIT, '--scope', scope) for scope in ('all', 'first', 'verdict')

@@ -20,7 +20,7 @@ from trajectory_guard.multi_dof import MultiDofTrajectory
 from trajectory_guard.multi_dof_path import multi_dof_path
 from trajectory_guard.refine import cover_refined, Seen
 from trajectory_guard.request import check_joints, motion_path, refusal, tracking_slack
-from trajectory_guard.result import Interval, NANOSECONDS, Result, Status, Verdict
+from trajectory_guard.result import ContactMoment, Interval, NANOSECONDS, Result, Status, Verdict
 from trajectory_guard.settings import Cover, Settings
 from trajectory_guard.timeline import intervals, with_witnesses
 from trajectory_guard.trajectory import JointState, Trajectory
@@ -264,6 +264,13 @@ def _answer(
         *_warnings(workcell, job.motion, pairs, path),
         *_mesh_warnings(workcell, covered, rows, settings),
     )
+    seconds = job.seconds + covered.seconds + time.perf_counter() - begin
+    contacts: tuple[ContactMoment, ...] = ()
+    if settings.want_contacts:
+        # Brings scipy.
+        from trajectory_guard.contact_moment import contact_moments
+
+        contacts = tuple(contact_moments(workcell, path, rows))
     result = Result(
         verdict=verdict,
         reason_code=reason,
@@ -274,12 +281,13 @@ def _answer(
         interpolation=path.interpolation,
         robot_hash=workcell.robot_hash,
         scene_hash=workcell.scene_hash,
-        compute_time=job.seconds + covered.seconds + time.perf_counter() - begin,
+        compute_time=seconds,
         pieces=covered.pieces,
         pairs_checked=pairs.count,
         unchecked_pairs=pairs.unchecked,
         warnings=warnings,
         duration_ns=path.duration_ns,
+        contacts=contacts,
         name=name,
     )
     return _Answer(result, leaves, covered)

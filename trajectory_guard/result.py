@@ -80,6 +80,46 @@ class Interval:
 
 
 @dataclass(frozen=True, slots=True)
+class ContactMoment:
+    """
+    A contact that begins or ends, as its features tell.
+
+    The constraint between the two features [Canny 1984] has one sign before `earliest_ns`, the
+    other one after `latest_ns`, in the neighbourhood of the interval where the contact begins or
+    ends, and is zero in between: proved along the link's rational motion, whose error is counted.
+    That these features and no others touch is found, not proved; the interval is.
+
+    :param body: link of the robot.
+    :param obstacle: obstacle.
+    :param features: which ones of the two touch, in words.
+    :param begins: False: the contact ends.
+    :param earliest_ns: from the trajectory's own start [ns].
+    :param latest_ns: likewise [ns].
+    :param location: where, in the robot's root frame [m].
+    """
+
+    body: str
+    obstacle: str
+    features: str
+    begins: bool
+    earliest_ns: float
+    latest_ns: float
+    location: tuple[float, float, float]
+
+    def to_dict(self) -> dict:
+        """Return the JSON object of the contact, times in seconds."""
+        return {
+            'body': self.body,
+            'obstacle': self.obstacle,
+            'features': self.features,
+            'begins': self.begins,
+            'earliest': self.earliest_ns / NANOSECONDS,
+            'latest': self.latest_ns / NANOSECONDS,
+            'location': list(self.location),
+        }
+
+
+@dataclass(frozen=True, slots=True)
 class Result:
     """
     What the certifier says about one trajectory.
@@ -99,6 +139,7 @@ class Result:
     :param unchecked_pairs: what the verdict does not cover, in words.
     :param warnings: what a user should know and no interval can say.
     :param duration_ns: time of the last point [ns].
+    :param contacts: where collisions begin and end, as far as features tell; empty: not asked for.
     :param name: the trajectory's label.
     :param certificate: what proves the intervals, as a JSON object; None: not asked for.
     """
@@ -118,6 +159,7 @@ class Result:
     unchecked_pairs: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     duration_ns: int = 0
+    contacts: tuple[ContactMoment, ...] = ()
     name: str = ''
     certificate: dict | None = field(default=None, repr=False, compare=False)
 
@@ -160,4 +202,5 @@ class Result:
             'pairs_checked': self.pairs_checked,
             'unchecked_pairs': list(self.unchecked_pairs),
             'warnings': list(self.warnings),
+            **({'contacts': [one.to_dict() for one in self.contacts]} if self.contacts else {}),
         }

@@ -65,6 +65,7 @@ class Settings:
     :param cover: how the motion is enclosed.
     :param refine: look closer at suspect intervals, down to what rounding allows: contacts of
         polyhedra then begin and end within nanoseconds or so; not where a certificate is wanted.
+    :param want_contacts: name the features that touch where collisions begin and end.
     :param want_certificate: write down what proves each answer.
     :param allowed_start_tolerance: start state against a point 0 at time 0 [rad or m].
     :param joint_limit_tolerance: how far the curve may leave the joint limits [rad or m].
@@ -81,6 +82,7 @@ class Settings:
     scope: Scope = Scope.ALL
     cover: Cover = Cover.HULL
     refine: bool = True
+    want_contacts: bool = False
     want_certificate: bool = False
     allowed_start_tolerance: float = 0.01
     joint_limit_tolerance: float = 1e-6
@@ -110,6 +112,12 @@ class Settings:
                     Reason.INVALID_TRACKING_TOLERANCE,
                     f'tracking_tolerance must be finite and >= 0, got {value!r}',
                 )
+        if self.want_contacts and (self.clearance or any(self.tracking_tolerance)):
+            raise RequestError(
+                Reason.INVALID_PARAMETER,
+                'contacts are named without clearance and tracking_tolerance only: with them it '
+                'is not the bodies that touch',
+            )
         if self.want_certificate and self.cover is not Cover.HULL:
             raise RequestError(
                 Reason.INVALID_PARAMETER,

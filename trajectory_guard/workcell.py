@@ -67,7 +67,7 @@ class Workcell:
     link_nodes: np.ndarray = field(init=False)
     packed: Packed = field(init=False, repr=False)
     detail: Detail = field(init=False, repr=False)
-    _bodies: tuple[tuple[ConvexBody, ...], tuple[ConvexBody, ...]] = field(init=False, repr=False)
+    bodies: tuple[tuple[ConvexBody, ...], tuple[ConvexBody, ...]] = field(init=False, repr=False)
     _pairs: dict[bytes, Pairs] = field(init=False, repr=False, default_factory=dict)
     _ball_cells: 'list[BallCell]' = field(init=False, repr=False, default_factory=list)
 
@@ -92,7 +92,7 @@ class Workcell:
         if not obstacle_names:
             raise SceneError(Reason.SCENE_EMPTY, 'the scene has no obstacle')
         targets = [b for o in self.scene.obstacles for b in o.bodies]
-        keep('_bodies', (tuple(bodies), tuple(targets)))
+        keep('bodies', (tuple(bodies), tuple(targets)))
         keep('tree', folded)
         keep('links', solids(bodies, [folded.link_node[name] for name in names]))
         keep('obstacles', solids(targets, [-1] * len(targets)))
@@ -130,7 +130,7 @@ class Workcell:
 
         if not self._ball_cells:
             # Two threads may both make one; either will do.
-            self._ball_cells.append(BallCell(*self._bodies))
+            self._ball_cells.append(BallCell(*self.bodies))
         return self._ball_cells[0]
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.clock import best_ms
 from bench.figure2 import contacts, l_shape, obstacles, PAPER_SECONDS, path
+from bench.pinned import pin
 from trajectory_guard.canny import (
     Configuration,
     ConvexPolyhedron,
@@ -180,4 +181,5 @@ TABLES: dict[str, Callable[[], Iterator[dict]]] = {
     'pair': pair,
     'exact': exact,
     'growth': growth,
+    'pin': pin,
 }

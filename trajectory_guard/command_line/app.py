@@ -1,13 +1,14 @@
 """The commands ``check``, ``replay`` and ``verify``."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from trajectory_guard.command_line import options
 from trajectory_guard.command_line.request import Request, Verification
 from trajectory_guard.command_line.run import run, run_verify
+from trajectory_guard.errors import RequestError
 from trajectory_guard.settings import Settings
 
 _DEFAULTS = Settings()
@@ -54,11 +55,12 @@ def check(
     scope: options.ScopeOption = _DEFAULTS.scope,
     cover: options.CoverOption = _DEFAULTS.cover,
     refine: options.Refine = _DEFAULTS.refine,
+    contacts: options.Contacts = False,
     certificate: options.Certificate = None,
     json: options.Json = False,
 ) -> None:
     """Certify trajectories from files; of a bag, what `replay` would take."""
-    settings = Settings(
+    settings = _settings(
         tolerance=tolerance,
         clearance=clearance,
         tracking_tolerance=(tracking_tolerance,),
@@ -66,6 +68,7 @@ def check(
         scope=scope,
         cover=cover,
         refine=refine,
+        want_contacts=contacts,
         want_certificate=certificate is not None,
         check_joint_limits=not no_joint_limits,
         allow_nonzero_end_velocity=allow_end_velocity,
@@ -104,11 +107,12 @@ def replay(
     scope: options.ScopeOption = _DEFAULTS.scope,
     cover: options.CoverOption = _DEFAULTS.cover,
     refine: options.Refine = _DEFAULTS.refine,
+    contacts: options.Contacts = False,
     certificate: options.Certificate = None,
     json: options.Json = False,
 ) -> None:
     """Certify recorded trajectories, each from the joint state measured last before it."""
-    settings = Settings(
+    settings = _settings(
         tolerance=tolerance,
         clearance=clearance,
         tracking_tolerance=(tracking_tolerance,),
@@ -116,6 +120,7 @@ def replay(
         scope=scope,
         cover=cover,
         refine=refine,
+        want_contacts=contacts,
         want_certificate=certificate is not None,
         check_joint_limits=not no_joint_limits,
         allow_nonzero_end_velocity=allow_end_velocity,
@@ -134,6 +139,14 @@ def replay(
         certificate=certificate,
     )
     raise typer.Exit(run(request, json=json))
+
+
+def _settings(**values: Any) -> Settings:
+    """Return the settings; options that do not go together are an error of usage."""
+    try:
+        return Settings(**values)
+    except RequestError as error:
+        raise typer.BadParameter(str(error)) from error
 
 
 @app.command()

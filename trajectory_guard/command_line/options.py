@@ -254,6 +254,12 @@ Refine = Annotated[
         help='Look closer at suspect intervals, down to what rounding allows.',
     ),
 ]
+Contacts = Annotated[
+    bool,
+    typer.Option(
+        '--contacts', help='Name the features that touch where collisions begin and end.'
+    ),
+]
 Json = Annotated[
     bool, typer.Option('--json', help='Print one JSON object a line for each trajectory.')
 ]

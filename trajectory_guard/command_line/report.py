@@ -10,7 +10,7 @@ from rich.text import Text
 from trajectory_guard.command_line.printable import printable
 from trajectory_guard.command_line.request import SELF_COLLISION_WARNING
 from trajectory_guard.errors import Reason
-from trajectory_guard.result import Interval, NANOSECONDS, Result, Status, Verdict
+from trajectory_guard.result import ContactMoment, Interval, NANOSECONDS, Result, Status, Verdict
 
 # More rows than this nobody reads; --json has them all.
 MAX_ROWS = 40
@@ -64,6 +64,8 @@ class Report:
         else:
             self._line(_summary(result))
             self._console.print(_table(result, self._console.width >= _WIDE))
+            for contact in result.contacts[:MAX_ROWS]:
+                self._line(_contact(contact))
         for warning in result.warnings:
             if warning != SELF_COLLISION_WARNING:
                 self._line(f'warning: {warning}', style='yellow')
@@ -123,6 +125,17 @@ def _table(result: Result, wide: bool) -> Table:
     return table
 
 
+def _contact(contact: ContactMoment) -> str:
+    """Return a contact in one line: when, within what, between which features, where."""
+    earliest, latest = contact.earliest_ns, contact.latest_ns
+    word = 'begins' if contact.begins else 'ends'
+    return (
+        f'contact {word} at {_seconds(round((earliest + latest) / 2))} s '
+        f'(within {latest - earliest:.1g} ns): {contact.body} - {contact.obstacle}, '
+        f'{contact.features}, at {_place(contact)} m'
+    )
+
+
 def _status(row: Interval) -> Text:
     """Return the status of an interval, and why it stayed open."""
     status = Text(row.status.name.lower(), style=_STATUS_STYLES[row.status])
@@ -154,7 +167,7 @@ def _has_gap(row: Interval) -> bool:
     return row.gap_lower is not None or row.gap_upper is not None
 
 
-def _place(row: Interval) -> str:
+def _place(row: Interval | ContactMoment) -> str:
     """Return where it is, to the millimetre [m]."""
     return ' '.join(f'{value:.3f}' for value in row.location or ())
 
