@@ -86,7 +86,7 @@ int64_t call_deepest(const double* matrix, const Solids* links, int64_t b, const
   std::vector<double> moved;
   Common found{};
   Meeting meeting{};
-  bool inside = deepest(pose, *links, b, *obstacles, o, moved, meeting, found);
+  bool inside = deepest(pose, *links, b, *obstacles, o, true, moved, meeting, found);
   copy(found.point, out, 3);
   copy(found.direction, out + 3, 3);
   copy(found.place, out + 6, 3);
@@ -96,18 +96,33 @@ int64_t call_deepest(const double* matrix, const Solids* links, int64_t b, const
 }
 
 double call_depth(const Solids* solids, int64_t b, const double* x) {
-  return depth(faces_of(*solids, b), x);
+  return depth(*solids, b, true, x);
 }
 
 double call_farthest(const double* x, const double* place, const double* matrices, int64_t count) {
   return farthest(x, place, controls_of(matrices, count));
 }
 
+// The same for solids that overlap by little along a direction.
+int64_t call_shallow(const double* matrix, const Solids* links, int64_t b, const Solids* obstacles,
+                     int64_t o, const double* n, double* out) {
+  double pose[POSE];
+  pose_of(matrix, pose);
+  Common found{};
+  bool inside = shallow(pose, *links, b, *obstacles, o, n, found);
+  copy(found.point, out, 3);
+  copy(found.place, out + 3, 3);
+  out[6] = found.mine;
+  out[7] = found.theirs;
+  return inside;
+}
+
 // Say whether a common point proves an overlap: one that moves from y0 to y1 in the link; where
 // y0 is null, one that stands, found at the pose `centre`. known: place, depth, start, end.
 int64_t call_witness(const double* matrices, double eps, const double* centre, const Solids* links,
                      int64_t b, const Solids* obstacles, int64_t o, double error, double fuzz,
-                     double margin, const double* y0, const double* y1, double* known) {
+                     double margin, const double* n, const double* y0, const double* y1,
+                     double* known) {
   Node node{};
   node.points = controls_of(matrices, CONTROLS);
   node.growth.eps = eps;
@@ -116,13 +131,13 @@ int64_t call_witness(const double* matrices, double eps, const double* centre, c
   Known told{};
   bool proved;
   if (y0 != nullptr) {
-    proved = moving_witness(*links, b, *obstacles, o, node, error, margin, y0, y1, told);
+    proved = moving_witness(*links, b, *obstacles, o, true, node, error, margin, y0, y1, told);
   } else {
     std::vector<double> moved;
     Meeting meeting{};
     Common found{};
-    proved = standing_witness(*links, b, *obstacles, o, node, error, fuzz, margin, moved, meeting,
-                              found, told);
+    proved = standing_witness(*links, b, *obstacles, o, true, n, node, error, fuzz, margin, moved,
+                              meeting, found, told);
   }
   copy(told.place, known, 3);
   known[3] = told.depth;
@@ -293,7 +308,7 @@ int64_t call_layout(char* text, int64_t room) {
   VALUE(guard::FIRST), VALUE(guard::LAST), VALUE(FACE_FIRST), VALUE(FACE_LAST);
   VALUE(guard::NODE), VALUE(WHOLE), VALUE(PARTS), VALUE(CHILD), VALUE(RANGES);
   VALUE(NO_PARTS), VALUE(BUILT), VALUE(UNBUILT), VALUE(TRIANGLE);
-  VALUE(BALL), VALUE(DISC), VALUE(CORE), VALUE(FAR), VALUE(SIZES);
+  VALUE(BALL), VALUE(DISC), VALUE(CORE), VALUE(FAR), VALUE(INSIDE), VALUE(SIZES);
   VALUE(AXIS), VALUE(CENTRE), VALUE(HALF), VALUE(BOX), VALUE(PLACES), VALUE(BOX_ROWS);
   VALUE(UNDECIDED), VALUE(guard::FREE), VALUE(SUSPECT), VALUE(COLLISION);
   VALUE(BY_TOLERANCE), VALUE(BY_DEPTH), VALUE(BY_BUDGET), VALUE(BY_STOP), VALUE(BY_SCOPE);

@@ -185,8 +185,38 @@ def deepest(pose, links, obstacles, b=0, o=0):
     return bool(inside), out[:3], out[3:6], out[6:9], out[9], out[10]
 
 
+def shallow(pose, links, obstacles, normal):
+    """
+    Call the search for a common point of solids that overlap by little along a normal.
+
+    :returns: whether one was found, point (3,), place (3,), depth in the link and the obstacle.
+    """
+    out = np.empty(8)
+    inside = call(
+        'call_shallow',
+        _floats(pose).reshape(12),
+        _solids(links),
+        0,
+        _solids(obstacles),
+        0,
+        _floats(normal),
+        out,
+        returns=ctypes.c_int64,
+    )
+    return bool(inside), out[:3], out[3:6], out[6], out[7]
+
+
 def witness(
-    points, links, obstacles, error, fuzz=0.0, margin=0.0, eps=0.0, centre=None, ends=None
+    points,
+    links,
+    obstacles,
+    error,
+    fuzz=0.0,
+    margin=0.0,
+    eps=0.0,
+    centre=None,
+    normal=(0.0, 0.0, 1.0),
+    ends=None,
 ):
     """
     Call the proof of an overlap by a point that moves between two `ends`, or that stands.
@@ -208,6 +238,7 @@ def witness(
         float(error),
         float(fuzz),
         float(margin),
+        _floats(normal),
         y0,
         y1,
         known,
@@ -237,7 +268,7 @@ def contact(pose, links, obstacles):
 
 
 def depth(solids, x, b=0):
-    """Call the depth of a point in a solid's inscribed polytope."""
+    """Call the depth of a point in what is known to be inside of a solid."""
     return call('call_depth', _solids(solids), b, _floats(x))
 
 

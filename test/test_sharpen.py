@@ -15,7 +15,6 @@ from test_certify import assert_partition, slide, slider
 from test_free_certify import cell as free_cell
 from test_free_certify import path as free_path
 
-from trajectory_guard.body import ConvexBody
 from trajectory_guard.certify import certify, judge
 from trajectory_guard.errors import Reason
 from trajectory_guard.joint_path import joint_path
@@ -252,14 +251,3 @@ def test_what_turns_out_to_be_free_does_not_stop_a_narrow_question(robot):
             asked = dataclasses.replace(settings, scope=scope)
             assert judge(cell, trajectory, None, asked).verdict is Verdict.FREE
     assert turned > 5
-
-
-def test_discs_are_left_as_they_are():
-    """Near the rim of a cylinder no overlap is proved, and the answer is that of before."""
-    round_body = ConvexBody(
-        np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]]), disc_radius=0.5, disc_axis=np.eye(3)[2]
-    )
-    cell, trajectory = slider(body=round_body), slide(0.0, 5.0)
-    fine = judge(cell, trajectory, None, Settings())
-    assert fine.intervals == judge(cell, trajectory, None, Settings(refine=False)).intervals
-    assert {Status.FREE, Status.SUSPECT} <= {row.status for row in fine.intervals}

@@ -84,6 +84,9 @@ class ConvexBody:
     :param disc_axis: unit normal of the disc, (3,); z if there is no disc.
     :param faces: rows (n, d), (m, 4): the polytope {x: n . x <= d} is bounded and lies inside the
         *real* geometry; |n| is 1 within 4 * 2^-53, d in m. No rows: nothing is known to be inside.
+    :param inside: of a sphere (one vertex) or a cylinder (two and a disc): how far inside the real
+        solid all of conv(vertices) + disc is, negative where rounding may have brought it out;
+        minus infinity: the real solid is another [m].
     :param surface: the real geometry, if that is a mesh and the body is more.
     :raises ValueError: a value is not finite, negative, or larger than `LARGEST_COORDINATE`.
     """
@@ -93,6 +96,7 @@ class ConvexBody:
     disc_radius: float = 0.0
     disc_axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     faces: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
+    inside: float = -math.inf
     surface: 'Surface | None' = field(default=None, repr=False)
     center: np.ndarray = field(init=False)
     radius: float = field(init=False)
@@ -115,6 +119,10 @@ class ConvexBody:
             if not 0.0 <= value <= LARGEST_COORDINATE:
                 raise ValueError(f'{name} must be in [0, {LARGEST_COORDINATE:g}] m, got {value}')
             object.__setattr__(self, name, value)
+        if not -math.inf <= self.inside <= self.ball:
+            raise ValueError(f'inside must be at most the ball {self.ball} m, got {self.inside}')
+        if self.inside > -math.inf and len(self.vertices) != (2 if self.disc_radius else 1):
+            raise ValueError('inside is known of spheres and cylinders only')
         center = near_center(self.vertices)
         object.__setattr__(self, 'center', read_only(center))
         object.__setattr__(self, 'radius', self._radius_about(center))
@@ -144,6 +152,7 @@ class ConvexBody:
             disc_radius=self.disc_radius,
             disc_axis=disc_axis / np.linalg.norm(disc_axis),
             faces=self._faces_moved(R, t),
+            inside=self.inside - rounding - 4.0 * U * abs(self.inside),
             surface=self.surface and self.surface.moved(read_only(T)),
         )
 

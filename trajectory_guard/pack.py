@@ -18,6 +18,10 @@ from trajectory_guard.kernels.layout import (
     UP,
 )
 
+# Of a point's depth in a sphere or cylinder, in units of the farthest coordinate: differences,
+# three products twice, a square root, and an axis that is off by as much.
+DEPTH_ROUNDING = 64.0
+
 # A box frame is looked for among this many of a polytope's faces.
 FACES_TRIED = 12
 
@@ -50,7 +54,9 @@ def solids(bodies: Sequence[ConvexBody], nodes: Sequence[int]) -> Solids:
             body.ball,
             body.disc_radius,
             _farthest(body, body.center),
-            (_farthest(body, np.zeros(3)) + body.ball) * UP,
+            far := (_farthest(body, np.zeros(3)) + body.ball) * UP,
+            # Measuring a depth rounds by a few units of the coordinates.
+            body.inside - DEPTH_ROUNDING * U * far,
         )
         for body in bodies
     ]

@@ -128,7 +128,7 @@ class Clusters:
         )
         return Solids(
             ranges=ranges.astype(np.int64),
-            size=np.column_stack((self._ball * one, zero, radius, far)),
+            size=np.column_stack((self._ball * one, zero, radius, far, -np.inf * one)),
             place=np.column_stack((zero, zero, one, center, half, pose.reshape(-1, 12))),
             vertices=np.ascontiguousarray(vertices.T),
             faces=np.empty((4, 0)),

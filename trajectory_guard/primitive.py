@@ -65,7 +65,7 @@ class Cylinder:
         faces[:-2, 3] = self.radius * math.cos(math.pi / PRISM_SIDES) * (1.0 - INWARD)
         faces[-2:, 2], faces[-2:, 3] = (1.0, -1.0), half
         ends = np.array([[0.0, 0.0, -half], [0.0, 0.0, half]])
-        return Loaded(ConvexBody(ends, disc_radius=self.radius, faces=faces), '')
+        return Loaded(ConvexBody(ends, disc_radius=self.radius, faces=faces, inside=0.0), '')
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,8 @@ class Sphere:
         """Return point plus ball; the faces are those of an inscribed polytope."""
         directions, inradius = sphere_directions()
         faces = np.column_stack((directions, np.full(len(directions), self.radius * inradius)))
-        return Loaded(ConvexBody(np.zeros((1, 3)), ball=self.radius, faces=faces), '')
+        body = ConvexBody(np.zeros((1, 3)), ball=self.radius, faces=faces, inside=self.radius)
+        return Loaded(body, '')
 
 
 @cache

@@ -140,7 +140,7 @@ class Cover {
         request(request),
         stop(stop),
         work(work),
-        ask{obstacles, boxes, request.tolerance, request.clearance},
+        ask{obstacles, boxes, request.tolerance, request.clearance, request.want_proof == 0},
         budget(request.max_pieces),
         motion{chain,      links,       path,     (chain.nodes + LANES - 1) / LANES * LANES,
                work.nodes, work.bodies, work.rho, work.chord,
@@ -252,14 +252,9 @@ class Cover {
 
   // Say whether a leaf may be looked at closer: not where a proof is wanted, whose pieces are those
   // of the tree; and what asks for parts is covered once more in any case.
-  //
-  // Near the rim of a disc no overlap is proved: all that lies between the rim and the polygon
-  // inscribed in it would be cut to pieces for nothing.
   bool suits(const Leaf& leaf) const {
     return request.sharpen && !work.proof.wanted && work.wanted.empty() && given_up < 0 &&
-           leaf.status == SUSPECT && leaf.reason == BY_TOLERANCE &&
-           motion.links.length(leaf.body, DISC) == 0.0 &&
-           ask.obstacles.length(leaf.obstacle, DISC) == 0.0;
+           leaf.status == SUSPECT && leaf.reason == BY_TOLERANCE;
   }
 
   // Write what a closer look at a leaf finds; false, and the leaf itself is written, if its share of
@@ -461,8 +456,8 @@ class Cover {
       Body& body = motion.bodies[b];
       if (body.error >= 0.0) continue;
       body.error = motion.fit_error(b);
-      double worth =
-          body.nearest + WORTH * (motion.links.length(b, CORE) + motion.links.length(b, BALL));
+      double worth = std::fmax(body.nearest, 0.0) +
+                     WORTH * (motion.links.length(b, CORE) + motion.links.length(b, BALL));
       if (body.sweep > ask.tolerance && !(body.error <= worth)) found = true;
     }
     return found;

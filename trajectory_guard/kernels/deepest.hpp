@@ -41,6 +41,39 @@ inline double depth(const Faces& faces, const double* x) {
   return faces.count == 0 || any(lost) ? -INFINITY : least(best);
 }
 
+// How deep a point lies inside a sphere or a cylinder as they really are, negative outside [m];
+// minus infinity for other solids.
+//
+// The core of a cylinder is the segment between its first two vertices plus a disc. A ball of radius
+// d about x lies in it if d is less than the distance of x from both ends and from the side. The
+// real solid is convex and its support function at least the core's plus INSIDE, so that it contains
+// the ball of radius d + INSIDE, if that is a radius. A sphere's core is a point, its vertex: where
+// d = -|x - c|.
+inline double round_depth(const Solids& solids, int64_t b, const double* x) {
+  double inside = solids.length(b, INSIDE);
+  if (!(inside > -INFINITY)) return -INFINITY;
+  int64_t v = solids.range(b, FIRST);
+  double off[3], axis[3], along = 0.0, length = 0.0, square = 0.0, radius = solids.length(b, DISC);
+  for (int r = 0; r < 3; r++) {
+    const double* row = solids.vertices + r * solids.vertex_stride + v;
+    off[r] = x[r] - row[0];
+    axis[r] = solids.at(b, AXIS)[r];
+    along += off[r] * axis[r];
+    length += (row[1] - row[0]) * axis[r];
+  }
+  if (radius == 0.0) return inside - std::sqrt(off[0] * off[0] + off[1] * off[1] + off[2] * off[2]);
+  for (int r = 0; r < 3; r++) square += (off[r] - along * axis[r]) * (off[r] - along * axis[r]);
+  double ends = length < 0.0 ? std::fmin(-along, along - length) : std::fmin(along, length - along);
+  return std::fmin(ends, radius - std::sqrt(square)) + inside;
+}
+
+// How deep a point lies inside a solid, negative outside [m]: in its polytope, and if `round` may be
+// taken as what it is, in that.
+inline double depth(const Solids& solids, int64_t b, bool round, const double* x) {
+  double flat = depth(faces_of(solids, b), x);
+  return round ? std::fmax(flat, round_depth(solids, b, x)) : flat;
+}
+
 // The face that (x, t) violates most, if by more than `worst`, which is raised.
 inline bool most_violated(const Faces& faces, const double* x, double t, double& worst,
                           int64_t& f) {
@@ -146,10 +179,11 @@ struct Basis4 {
 
 // Propose a point deep inside a link and an obstacle at one pose; true if it is inside both.
 //
-// moved: scratch for the obstacle's faces in the node frame. meeting: where to start, and where it
-// ended.
+// round: whether the depths may be those of spheres and cylinders. moved: scratch for the obstacle's
+// faces in the node frame. meeting: where to start, and where it ended.
 inline bool deepest(const double* pose, const Solids& links, int64_t b, const Solids& obstacles,
-                    int64_t o, std::vector<double>& moved, Meeting& meeting, Common& out) {
+                    int64_t o, bool round, std::vector<double>& moved, Meeting& meeting,
+                    Common& out) {
   Faces mine = faces_of(links, b), world = faces_of(obstacles, o);
   for (int r = 0; r < 3; r++) out.point[r] = out.direction[r] = 0.0;
   if (mine.count == 0 || world.count == 0) return false;
@@ -210,8 +244,8 @@ inline bool deepest(const double* pose, const Solids& links, int64_t b, const So
     for (int r = 0; r < 3; r++) out.direction[r] = n[r] / length;
   if (!(x[3] > 0.0)) return false;
   image(pose, out.point, out.place);
-  out.mine = depth(mine, out.point);
-  out.theirs = depth(world, out.place);
+  out.mine = depth(links, b, round, out.point);
+  out.theirs = depth(obstacles, o, round, out.place);
   return true;
 }
 

@@ -19,6 +19,7 @@ struct Search {
   double best;      // its support difference [m]
   double distance;  // of the nearest points found [m]
   double place[3];  // the obstacle's nearest point [m]
+  double off[3];    // from there to the link's one [m]
 };
 
 // A difference of two support points, and the obstacle's one.
@@ -248,7 +249,7 @@ inline Found gjk(const double* first, const Images& images, const Solids& links,
   out.distance = INFINITY;
   for (int r = 0; r < 3; r++) {
     out.n[r] = n[r];
-    out.place[r] = 0.0;
+    out.place[r] = out.off[r] = 0.0;
   }
   for (int round = 0; round < rounds; round++) {
     double high = highest(obstacles, o, n);
@@ -290,7 +291,10 @@ inline Found gjk(const double* first, const Images& images, const Solids& links,
     // No progress: the nearest points are as good as rounding allows.
     if (!(length < out.distance)) return Found::SEPARATED;
     out.distance = length;
-    for (int r = 0; r < 3; r++) out.place[r] = place[r];
+    for (int r = 0; r < 3; r++) {
+      out.place[r] = place[r];
+      out.off[r] = near[r];
+    }
     if (count == 4 || length <= 1e-14 * (obstacles.length(o, FAR) + links.length(b, CORE)))
       return Found::OVERLAP;
     if (stop && length <= want) return Found::SEPARATED;  // no direction can do it

@@ -19,8 +19,9 @@ FIRST, LAST, FACE_FIRST, FACE_LAST, NODE, WHOLE, PARTS, CHILD = range(8)
 # What PARTS says: nothing finer is known; two finer solids from CHILD on contain the surface;
 # there are such two, but nobody has built them; a triangle of the real surface.
 NO_PARTS, BUILT, UNBUILT, TRIANGLE = range(4)
-# Columns of `Solids.size` [m]: ball, disc, sphere around vertices and disc, farthest point.
-BALL, DISC, CORE, FAR = range(4)
+# Columns of `Solids.size` [m]: ball, disc, sphere around vertices and disc, farthest point; how
+# far inside the real solid a sphere's centre or a cylinder's axis and disc is.
+BALL, DISC, CORE, FAR, INSIDE = range(5)
 # Columns of `Floating.bounds`.
 TURN_ERROR, SHIFT_ERROR, STRETCH, RIGID = range(4)
 # Columns of `Solids.place`: disc normal, sphere centre, box half sides, pose of the box (12).
@@ -90,8 +91,10 @@ class Solids(NamedTuple):
     :param ranges: (B, 8) int64: FIRST:LAST vertices, FACE_FIRST:FACE_LAST faces, NODE that
         carries the solid (-1: the root), WHOLE that it is a part of (itself if of none), PARTS
         what is known of its parts, CHILD the first of two if they are BUILT.
-    :param size: (B, 4): BALL radius, DISC radius, CORE radius of the sphere around vertices and
-        disc, FAR the largest distance of the solid from the frame's origin [m].
+    :param size: (B, 5): BALL radius, DISC radius, CORE radius of the sphere around vertices and
+        disc, FAR the largest distance of the solid from the frame's origin, INSIDE how far inside
+        the real solid each point of conv(vertices) + disc is if that is a sphere's centre or a
+        cylinder (negative: rounding may have brought it outside), minus infinity if not [m].
     :param place: (B, 21): AXIS unit normal of the disc, CENTRE of the CORE sphere, HALF sides and
         pose BOX of an oriented box that contains vertices and disc [m].
     :param vertices: (3, V) [m].

@@ -45,6 +45,7 @@ struct Question {
   const Solids& obstacles;
   const Boxes& boxes;
   double tolerance, clearance;
+  bool round;  // spheres and cylinders overlap as what they are, not only as polytopes
 };
 
 // Remember a direction if it proves more than the best one so far.
@@ -124,8 +125,8 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
 
   bool deep_start = live.start.state == Instant::DEEP, deep_end = live.end.state == Instant::DEEP;
   auto moving = [&] {
-    return moving_witness(links, b, obstacles, o, node, doubt.error + loose, margin, live.start.y,
-                          live.end.y, known);
+    return moving_witness(links, b, obstacles, o, ask.round, node, doubt.error + loose, margin,
+                          live.start.y, live.end.y, known);
   };
   if (node.sound && deep_start && deep_end && moving()) return Outcome::OVERLAPS;
   bool maybe_free = node.sound && !deep_start && !deep_end;
@@ -142,7 +143,7 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
   bool deep = false;
   auto stands = [&] {
     if (!rigid) return false;
-    bool whole = standing_witness(links, b, obstacles, o, node, doubt.error + loose,
+    bool whole = standing_witness(links, b, obstacles, o, ask.round, n, node, doubt.error + loose,
                                   body.fuzz + loose, margin, scratch, live.meeting, common, known);
     deep = known.depth > 0.0;
     return whole;
@@ -157,6 +158,7 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
     known.upper = found.distance - balls + shrunk + body.fuzz + margin;
     for (int r = 0; r < 3; r++) known.place[r] = found.place[r];
     if (state != Found::OVERLAP) {
+      for (int r = 0; r < 3; r++) n[r] = found.n[r];
       if (found.best - balls > limit) live.centre.state = Instant::APART;
       if (node.sound) {
         known.near = near_bound(found, node, balls, doubt.error + margin);
@@ -174,7 +176,9 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
                                       body.fuzz + loose, margin, known)
                  ? Outcome::OVERLAPS
                  : Outcome::OPEN;
-    if (!(deep_start || deep_end) && stands()) return Outcome::OVERLAPS;
+    // What is round is looked for along the direction, which is better known now.
+    bool again = ask.round && (is_round(links, b) || is_round(obstacles, o));
+    if ((again || !(deep_start || deep_end)) && stands()) return Outcome::OVERLAPS;
   }
   if (node.sound && deep) {
     remember(live.centre, common);
@@ -187,7 +191,7 @@ inline Outcome examine(Motion& motion, const Question& ask, const Piece& piece, 
       Common at_end;
       end_pose(points, last, pose);
       end.state = Instant::APART;
-      if (deepest(pose, links, b, obstacles, o, scratch, live.meeting, at_end))
+      if (common_point(pose, links, b, obstacles, o, ask.round, n, scratch, live.meeting, at_end))
         remember(end, at_end);
     }
     if (!(deep_start && deep_end) && live.start.state == Instant::DEEP &&

@@ -16,8 +16,10 @@ enum { FIRST, LAST, FACE_FIRST, FACE_LAST, NODE, WHOLE, PARTS, CHILD, RANGES };
 // What PARTS says: nothing finer is known; two finer solids contain all of the surface, the first
 // at CHILD; there are such two, but nobody has built them; a triangle of the real surface.
 enum : int64_t { NO_PARTS, BUILT, UNBUILT, TRIANGLE };
-// Columns of Solids::size [m]: ball, disc, sphere around vertices and disc, farthest point.
-enum { BALL, DISC, CORE, FAR, SIZES };
+// Columns of Solids::size [m]: ball, disc, sphere around vertices and disc, farthest point; how far
+// inside the real solid all of a sphere's centre or a cylinder's axis and disc is, minus infinity
+// for other solids.
+enum { BALL, DISC, CORE, FAR, INSIDE, SIZES };
 // Columns of Solids::place: disc normal, sphere centre, box half sides, pose of the box (12).
 enum { AXIS = 0, CENTRE = 3, HALF = 6, BOX = 9, PLACES = 21 };
 

@@ -13,14 +13,18 @@
 // The piece overlaps at every instant if all Q_k lie inside the obstacle by more than the error, or
 // if they stay nearer to the chord of the two places than the depths together.
 //
+// Depths are bounds from below on the distance to the outside of a convex solid, which is concave:
+// those of a point between others are no smaller, whichever way each was found. A proof that is
+// written down knows polytopes only; elsewhere spheres and cylinders are `round`, as they are.
+//
 // The true solids are the core, moved, plus a ball that turning does not change; so an overlap at
 // the built pose is one at the true pose if the core is off by less than the depths. Only where
 // the linear part is no rotation does the built motion move a point of the ball otherwise: eps
 // times its radius.
 #pragma once
 
-#include "deepest.hpp"
 #include "leaf.hpp"
+#include "shallow.hpp"
 
 namespace guard {
 
@@ -34,19 +38,19 @@ inline void end_pose(const Controls& points, bool last, double* pose) {
 // Say whether the point that moves from y0 to y1 in the link (node frame) proves the overlap of the
 // whole piece; `known` then tells of it.
 //
-// error: bound on the distance of the true motion to the built one; margin: on rounding [m].
+// round: whether spheres and cylinders count as what they are. error: bound on the distance of the
+// true motion to the built one; margin: on rounding [m].
 inline bool moving_witness(const Solids& links, int64_t b, const Solids& obstacles, int64_t o,
-                           const Node& node, double error, double margin, const double* y0,
-                           const double* y1, Known& known) {
+                           bool round, const Node& node, double error, double margin,
+                           const double* y0, const double* y1, Known& known) {
   const Controls& points = node.points;
-  Faces faces = faces_of(obstacles, o), own = faces_of(links, b);
   double pose[POSE], first[3], last[3];
   end_pose(points, false, pose);
   image(pose, y0, first);
   end_pose(points, true, pose);
   image(pose, y1, last);
-  double mine = std::fmin(depth(own, y0), depth(own, y1));
-  double theirs = std::fmin(depth(faces, first), depth(faces, last));
+  double mine = std::fmin(depth(links, b, round, y0), depth(links, b, round, y1));
+  double theirs = std::fmin(depth(obstacles, o, round, first), depth(obstacles, o, round, last));
   if (!(mine > 0.0 && theirs > 0.0)) return false;
   // The point may lie off the core, within the ball: a linear part that is no rotation moves it.
   error += node.growth.eps * links.length(b, BALL);
@@ -64,7 +68,7 @@ inline bool moving_witness(const Solids& links, int64_t b, const Solids& obstacl
     }
     if (!(square < INFINITY)) return false;
     stray = std::fmax(stray, square);
-    shallow = std::fmin(shallow, depth(faces, place));
+    shallow = std::fmin(shallow, depth(obstacles, o, round, place));
   }
   if (!(shallow > error + 2.0 * margin || std::sqrt(stray) + error + 2.0 * margin < mine + theirs))
     return false;
@@ -80,13 +84,14 @@ inline bool moving_witness(const Solids& links, int64_t b, const Solids& obstacl
 
 // Look for a common point at the centre: true if it proves the overlap of the whole piece.
 //
-// fuzz: bound on the error of the centre pose. known: upper, place, depth and the witness are
-// written when the point is proved.
+// n: about the normal of the contact, of unit length. fuzz: bound on the error of the centre pose.
+// known: upper, place, depth and the witness are written when the point is proved.
 inline bool standing_witness(const Solids& links, int64_t b, const Solids& obstacles, int64_t o,
-                             const Node& node, double error, double fuzz, double margin,
-                             std::vector<double>& moved, Meeting& meeting, Common& found,
-                             Known& known) {
-  if (!deepest(node.pose, links, b, obstacles, o, moved, meeting, found)) return false;
+                             bool round, const double* n, const Node& node, double error,
+                             double fuzz, double margin, std::vector<double>& moved,
+                             Meeting& meeting, Common& found, Known& known) {
+  if (!common_point(node.pose, links, b, obstacles, o, round, n, moved, meeting, found))
+    return false;
   if (!(found.mine > fuzz + margin && found.theirs > margin)) return false;
   for (int r = 0; r < 3; r++) {
     known.place[r] = found.place[r];
