@@ -63,8 +63,8 @@ class Settings:
     :param max_pieces: motion pieces that may be examined; the rest is *suspect*.
     :param scope: how much of the motion is asked about.
     :param cover: how the motion is enclosed.
-    :param refine: look closer at suspect intervals, down to what rounding allows: contacts of
-        polyhedra then begin and end within nanoseconds or so; not where a certificate is wanted.
+    :param refine: look closer at suspect intervals, down to what rounding allows: contacts then
+        begin and end within nanoseconds or so; not where a certificate is wanted.
     :param want_contacts: name the features that touch where collisions begin and end.
     :param want_certificate: write down what proves each answer.
     :param allowed_start_tolerance: start state against a point 0 at time 0 [rad or m].
