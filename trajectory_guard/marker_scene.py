@@ -27,7 +27,7 @@ class MarkerLimits(NamedTuple):
     """
 
     markers: int = 1_000
-    points: int = 100_000
+    points: int = 10_000
     mesh_bytes: int = 64 * 1024 * 1024
 
 
