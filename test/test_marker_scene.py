@@ -137,9 +137,14 @@ def test_a_mesh_is_scaled_and_read_once(tmp_path):
         scene(marker(Marker.MESH_RESOURCE, 1, mesh_resource=f'file://{path}'), into=first)
     assert error.value.reason is Reason.MESH_MISSING
     write(mesh, path)
-    with pytest.raises(SceneError, match=r"'ns/0'.*bytes, more than 100") as error:
-        scene(resource, limits=MarkerLimits(mesh_bytes=100))
-    assert error.value.reason is Reason.TOO_LARGE
+    for limits, reason in (
+        (MarkerLimits(mesh_bytes=100), Reason.TOO_LARGE),
+        (MarkerLimits(mesh_roots=(tmp_path / 'other',)), Reason.MESH_FORBIDDEN),
+    ):
+        with pytest.raises(SceneError, match=r"'ns/0'.*u.stl") as error:
+            scene(resource, limits=limits)
+        assert error.value.reason is reason
+    assert names(scene(resource, limits=MarkerLimits(mesh_roots=(tmp_path,)))) == ['ns/0']
 
 
 # What comes and goes
