@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 import time
+from types import SimpleNamespace
 
 from guard_process import ARM, PATIENCE, ros_context, SCENE, spinning
 from marker_messages import array, BASE, delete_all, marker
@@ -63,6 +64,38 @@ def test_what_was_published_before_is_there_and_what_comes_later_too(node: Node)
     publisher.publish(array(delete_all()))
     until(lambda: len(changes) == 5)
     assert live.state.error is None and not live.state.scene.entries
+
+
+def test_no_array_falls_out_of_a_queue(node: Node) -> None:
+    """Taking an array can take longer than publishing many."""
+    seen: list[int] = []
+
+    def slowly() -> None:
+        seen.append(len(live.state.scene.entries))
+        time.sleep(0.3 if len(seen) == 1 else 0.0)
+
+    live = LiveScene(node, 'burst', slowly)
+    publisher = node.create_publisher(MarkerArray, 'burst', MARKERS)
+    until(lambda: publisher.get_subscription_count() == 1)
+    for k in range(50):
+        publisher.publish(array(marker(number=k)))
+    until(lambda: len(seen) == 50)
+    assert seen == [*range(1, 51)]
+
+
+def test_a_lost_array_is_an_error_until_a_new_beginning(node: Node) -> None:
+    changes: list[int] = []
+    live = LiveScene(node, 'lossy', lambda: changes.append(1))
+    # The middleware reports it so; it cannot be made to lose one.
+    live._lost(SimpleNamespace(total_count=3, total_count_change=1))
+    assert changes and '3 arrays were lost' in str(live.state.error)
+    publisher = node.create_publisher(MarkerArray, 'lossy', MARKERS)
+    publisher.publish(array(marker()))
+    until(lambda: len(changes) == 2)
+    assert live.state.error is not None
+    publisher.publish(array(delete_all(), marker()))
+    until(lambda: len(changes) == 3)
+    assert live.state.error is None
 
 
 def test_nothing_has_come_yet(node: Node) -> None:
