@@ -1,5 +1,8 @@
 """Obstacles from markers contain what a viewer draws, and come and go as in a viewer."""
 
+from fractions import Fraction
+from itertools import product
+
 from bench_data import BENCH, cases, SETTINGS, workcell
 from marker_messages import array, BASE, delete, delete_all, drawn, marker, outside, TURNED, UNIT
 from meshes import extruded, write
@@ -7,6 +10,7 @@ from meshes import U as U_SHAPE
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from test_quaternion import exact_rotation
 from visualization_msgs.msg import Marker
 
 from msg_adapters.marker import changes_from_message
@@ -70,6 +74,39 @@ def test_all_that_is_drawn_is_in_the_obstacle(message):
     # And no more than an ellipsoid's polyhedron needs, or a list's unequal spheres.
     if message.type != Marker.SPHERE_LIST:
         assert nearest.max() > -0.02
+
+
+@pytest.mark.parametrize('far', [0.0, 1.0, 1e6])
+@pytest.mark.parametrize('kind', [Marker.CUBE, Marker.CUBE_LIST, Marker.TRIANGLE_LIST])
+def test_the_exact_corners_are_in_the_balls_of_the_vertices(kind, far):
+    """In rationals: the rotation of the quaternion as the message has it, made of length 1."""
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        q = rng.normal(size=4)
+        q *= (1 + rng.uniform(-1e-3, 1e-3)) / np.linalg.norm(q)
+        scale, shift = rng.uniform(0.1, 3.0, 3), far * rng.normal(size=3)
+        points = rng.normal(size=(1 if kind == Marker.CUBE_LIST else 3, 3))
+        message = marker(kind, scale=scale, position=shift, quaternion=q, points=points)
+        ((body,),) = (o.bodies for o in scene(message).obstacles(FRAMES))
+        S, R = [Fraction(x) for x in scale], exact_rotation(q)
+        if kind == Marker.TRIANGLE_LIST:
+            local = [[s * Fraction(x) for s, x in zip(S, p, strict=True)] for p in points]
+        else:
+            middle = points[0] if kind == Marker.CUBE_LIST else np.zeros(3)
+            local = [
+                [Fraction(m) + sign * s / 2 for m, sign, s in zip(middle, corner, S, strict=True)]
+                for corner in product((-1, 1), repeat=3)
+            ]
+        balls = [[Fraction(x) for x in vertex] for vertex in body.vertices]
+        for p in local:
+            exact = [
+                sum(r * x for r, x in zip(row, p, strict=True)) + Fraction(t)
+                for row, t in zip(R, shift, strict=True)
+            ]
+            nearest = min(
+                sum((a - b) ** 2 for a, b in zip(exact, ball, strict=True)) for ball in balls
+            )
+            assert nearest <= Fraction(body.ball) ** 2
 
 
 @pytest.mark.parametrize(
