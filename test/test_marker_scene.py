@@ -4,6 +4,7 @@ from fractions import Fraction
 from itertools import product
 
 from bench_data import BENCH, cases, SETTINGS, workcell
+import kernel_calls
 from marker_messages import array, BASE, delete, delete_all, drawn, marker, outside, TURNED, UNIT
 from meshes import extruded, write
 from meshes import U as U_SHAPE
@@ -18,6 +19,7 @@ from trajectory_guard.certify import judge
 from trajectory_guard.errors import Reason, SceneError
 from trajectory_guard.marker import MarkerKind
 from trajectory_guard.marker_scene import fixed_frames, MarkerLimits, MarkerScene, with_markers
+from trajectory_guard.pack import solids
 from trajectory_guard.primitive import Box
 from trajectory_guard.result import Status
 from trajectory_guard.scene import Obstacle, Scene
@@ -112,13 +114,16 @@ def test_the_exact_corners_are_in_the_balls_of_the_vertices(kind, far):
 @pytest.mark.parametrize(
     'message', [m for m in KINDS if 'SPHERE' in KIND_NAMES[m.type] or m.type == Marker.CYLINDER]
 )
-def test_no_surface_point_is_in_the_polytope_inside(message):
+def test_no_surface_point_is_inside(message):
+    """Neither in the polytope inside of the body nor in the round solid it is taken for."""
     (obstacle,) = scene(message).obstacles(FRAMES)
     points = drawn(message, np.random.default_rng(1), 4000)
     for body in obstacle.bodies:
         assert len(body.faces)
         depth = (body.faces[:, 3] - points @ body.faces[:, :3].T).min(axis=1)
         assert depth.max() <= ROUNDING
+        packed = solids([body], [-1])
+        assert max(kernel_calls.depth(packed, point) for point in points[:500]) <= ROUNDING
 
 
 def test_a_frame_rigidly_attached_to_the_root_counts():

@@ -81,7 +81,8 @@ def _element(marker: Marker) -> ConvexBody:
             # Viewers draw the spheres of a list as disks that face the camera: with unequal
             # diameters nothing but the smallest is surely filled.
             outer = Sphere(0.5 * max(marker.scale)).load().body
-            return replace(outer, faces=Sphere(0.5 * min(marker.scale)).load().body.faces)
+            inner = Sphere(0.5 * min(marker.scale)).load().body
+            return replace(outer, faces=inner.faces, inside=inner.inside)
     raise marker.refusal('type', marker.kind, Reason.GEOMETRY_UNSUPPORTED)
 
 
