@@ -312,7 +312,7 @@ def test_edges_that_cross_within_rounding_of_parallel_touch_in_a_point_of_both(t
 
 
 def test_a_body_smaller_than_rounding_of_its_place_touches_somewhere():
-    speck, roof = scaled(LOG, 1e-10), scaled(ROOF, 1e6)
+    speck, roof = scaled(LOG, 1e-12), scaled(ROOF, 1e6)
     there = still(Configuration((1e6, 0, 0)))
     (one,) = overlaps([speck], line((1e6, 1e5, -1), (1e6, 1e5, 1)), [roof], there)
     points = [contact.point for contact in one.opening if contact.kind == Kind.C]
