@@ -111,6 +111,23 @@ def test_exact_value_lies_within_the_error(kind, seed):
 
 
 @pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('weight', [1.0, 0.125, 3.0, 1e3])
+def test_a_body_that_stands_has_a_weight_like_any_other(kind, weight):
+    """One control point: the value is still that times the weight, and so is its error."""
+    rng = np.random.default_rng(8)
+    pose = np.column_stack((np.eye(3), [0.5, -0.25, 2.0]))
+    of_a, of_b = random_features(rng, kind)
+    found = along(RationalMotion(pose[None], np.array([weight]), 0.0, 0.0, 0.0), kind, of_a, of_b)
+    shift = [Fraction(c) for c in pose[:, 3].tolist()]
+    value = exact_value(
+        kind, lambda p: [Fraction(x) + t for x, t in zip(p, shift, strict=True)], of_a, of_b
+    )
+    (constant,) = found.coefficients.tolist()
+    assert abs(Fraction(constant) - Fraction(weight) * value) <= Fraction(found.error)
+    assert found.error < 1e-12 * weight
+
+
+@pytest.mark.parametrize('kind', KINDS)
 def test_a_motion_with_an_error_has_one_that_covers_it(kind):
     """True points moved off by up to e: a rigid shift of e in any direction."""
     rng = np.random.default_rng(3)

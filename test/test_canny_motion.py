@@ -59,6 +59,13 @@ def test_what_is_refused(positions, quaternions, words):
         Motion(np.array(positions, float), np.array(quaternions, float))
 
 
+@pytest.mark.parametrize('length', [1e-100, 1e-200, 1e-300])
+def test_quaternions_of_any_length_have_a_pose(length):
+    """Half way the line hardly misses 0, at a half turn about x."""
+    motion = Motion(np.zeros((1, 3)), np.array([[1.0, 0, 0, 0], [-1.0, length, 0, 0]]))
+    assert motion.pose(0.5)[:, :3].tolist() == np.diag([1.0, -1.0, -1.0]).tolist()
+
+
 def test_a_standing_body_stands():
     pose = still(Configuration((1, 2, 3), (0, 0, 0, 5))).pose(0.7)
     np.testing.assert_array_equal(pose, [[-1, 0, 0, 1], [0, -1, 0, 2], [0, 0, 1, 3]])

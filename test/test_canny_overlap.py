@@ -286,6 +286,39 @@ def test_contacts_lie_on_both_bodies(seed):
                     assert abs(height(body, own)) < 1e-9
 
 
+LOG = ConvexPolyhedron.hull([[1, 0, 0], [-1, 0, 0], [0, 1, -1], [0, -1, -1]])
+ROOF = ConvexPolyhedron.hull([[0, 1, 0], [0, -1, 0], [1, 0, 1], [-1, 0, 1]])
+
+
+@pytest.mark.parametrize('factor', [1.0, 1e-60, 1e-90, 1e-200, 1e-300, 1e8])
+def test_crossing_edges_touch_in_a_point_at_every_size(factor):
+    a, b = scaled(LOG, factor), scaled(ROOF, factor)
+    start, end = ((0.125 * factor, 0.25 * factor, z * factor) for z in (-1, 1))
+    (one,) = overlaps([a], line(start, end), [b])
+    (contact,) = one.opening
+    assert contact.kind == Kind.C
+    assert np.array(contact.point) / factor == pytest.approx([0, 0.25, 0], abs=1e-12)
+
+
+@pytest.mark.parametrize('tilt', [1e-20, 1e-200, 5e-324])
+def test_edges_that_cross_within_rounding_of_parallel_touch_in_a_point_of_both(tilt):
+    """The lower edge runs from x = 0 to 2, the upper one from -1 to 1."""
+    tilted = ConvexPolyhedron.hull([[2, tilt, 0], [0, -tilt, 0], [1, 1, -1], [1, -1, -1]])
+    upper = ConvexPolyhedron.hull([[1, 0, 0], [-1, 0, 0], [0, 1, 1], [0, -1, 1]])
+    (one,) = overlaps([tilted], line((-0.25, 0, -1), (-0.25, 0, 1)), [upper])
+    (x, y, z) = next(c.point for c in one.opening if c.kind == Kind.C)
+    assert -0.25 <= x <= 1.0
+    assert (y, z) == pytest.approx((0, 0), abs=1e-12)
+
+
+def test_a_body_smaller_than_rounding_of_its_place_touches_somewhere():
+    speck, roof = scaled(LOG, 1e-12), scaled(ROOF, 1e6)
+    there = still(Configuration((1e6, 0, 0)))
+    (one,) = overlaps([speck], line((1e6, 1e5, -1), (1e6, 1e5, 1)), [roof], there)
+    points = [contact.point for contact in one.opening if contact.kind == Kind.C]
+    assert points == [pytest.approx((1e6, 1e5, 0))]
+
+
 def height(body, point):
     """Return the largest height of a point above the planes of a body."""
     highest = -np.inf

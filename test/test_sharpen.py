@@ -224,6 +224,43 @@ def test_a_budget_for_less_keeps_the_answer_of_before(robot):
                 assert covers(spans(fine, status), spans(result, status))
 
 
+@pytest.mark.parametrize('scope', Scope)
+def test_every_budget_proves_part_of_the_answer(scope):
+    """Wherever a closer look is cut off, nothing is claimed that the whole one does not prove."""
+    cell, trajectory = slider(), slide(0.0, 5.0)
+    fine = judge(cell, trajectory, None, Settings())
+    rough = judge(cell, trajectory, None, Settings(refine=False))
+    seen = set()
+    for pieces in range(1, fine.pieces + 2):
+        result = judge(cell, trajectory, None, Settings(max_pieces=pieces, scope=scope))
+        assert_partition(result)
+        assert result.pieces <= pieces
+        assert result.verdict is not Verdict.FREE
+        for status in (Status.FREE, Status.COLLISION):
+            assert covers(spans(fine, status), spans(result, status))
+        seen.add(result.intervals)
+    assert len(seen) > 1
+    if scope is Scope.ALL:
+        assert {rough.intervals, fine.intervals} <= seen
+
+
+@pytest.mark.parametrize('robot', ROBOTS)
+def test_a_deadline_at_any_time_proves_part_of_the_answer(robot):
+    """A clock may stop the tree, the closer look, or neither."""
+    cell = workcell(robot)
+    for trajectory in colliding(robot)[::8]:
+        fine = judge(cell, trajectory, None, SETTINGS)
+        for deadline in np.geomspace(1e3, 1e7, 25).astype(int).tolist():
+            settings = dataclasses.replace(SETTINGS, deadline_ns=deadline)
+            result = judge(cell, trajectory, None, settings)
+            assert_partition(result)
+            assert result.verdict is not Verdict.FREE
+            for status in (Status.FREE, Status.COLLISION):
+                assert covers(spans(fine, status), spans(result, status))
+        longest = dataclasses.replace(SETTINGS, deadline_ns=60 * SECOND)
+        assert judge(cell, trajectory, None, longest).intervals == fine.intervals
+
+
 def test_a_passed_deadline_is_one_still():
     result = judge(slider(), slide(0.0, 5.0), None, Settings(deadline_ns=0))
     assert [row.reason for row in result.intervals] == [Reason.DEADLINE.value]

@@ -42,7 +42,8 @@ class Interval:
     :param location: the place in the robot's root frame: the nearest obstacle point, or the
         witness inside both solids [m].
     :param gap_lower: proved lower bound of the pair's distance over the interval and the tracking
-        tolerance, negative when an overlap cannot be excluded [m]; None: unknown.
+        tolerance, negative when an overlap cannot be excluded [m]; None: unknown. It does not
+        speak of the part of a nanosecond by which an end is rounded into a collision.
     :param gap_upper: upper bound of the pair's smallest distance in the interval, negative for a
         proved overlap, 0 where surfaces are proved to cross [m]; None: unknown.
     """

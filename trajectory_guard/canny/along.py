@@ -132,7 +132,7 @@ def _type_b(motion: RationalMotion, point: np.ndarray, corners: np.ndarray) -> A
     normal = _cross(_minus(c1, c0), _minus(c2, c0))
     whole = _dot(normal, _minus(_moved(motion, weight, point), _still(weight, corners[0])))
     a, b = _length(corners[1] - corners[0]), _length(corners[2] - corners[0])
-    return _divided(motion, whole, one, a * b * motion.error)
+    return _divided(motion, whole, None, a * b * motion.error)
 
 
 def _type_c(motion: RationalMotion, edge_a: np.ndarray, edge_b: np.ndarray) -> Along:
@@ -196,11 +196,13 @@ def _reach(motion: RationalMotion, x: np.ndarray, place: np.ndarray) -> float:
     return float(np.linalg.norm(off + rounding, axis=1).max()) * UP
 
 
-def _divided(motion: RationalMotion, whole: _Scaled, divisor: _Scaled, slack: float) -> Along:
-    """Return the quotient with all that it may be off, see the head of the file."""
+def _divided(
+    motion: RationalMotion, whole: _Scaled, divisor: _Scaled | None, slack: float
+) -> Along:
+    """Return the quotient with all that it may be off, see the head of the file; by 1 if None."""
     n = len(motion.weights) - 1
     binomials = _binomials(n)
-    if len(divisor.c) == 1:
+    if divisor is None:
         scaled, off = whole.c, float((whole.error / binomials).max())
     else:
         scaled = _proposed(whole.c, divisor.c, n)

@@ -1,5 +1,6 @@
 """Which features touch at an instant, and where."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +9,9 @@ from trajectory_guard.canny.conditions import Constraints, edge_meets_face
 from trajectory_guard.canny.constraint import Kind
 from trajectory_guard.canny.motion import Motion
 from trajectory_guard.canny.transitions import holds
+
+# Squared sine of an angle that is nothing but rounding.
+PARALLEL = 2.0**-100
 
 
 class Contact(NamedTuple):
@@ -97,8 +101,22 @@ def contact_point(
 
 
 def _crossing(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the point of a segment that is nearest to the line of another, (2, 3) each."""
-    along = a[1] - a[0]
-    normal = np.cross(b[1] - b[0], np.cross(along, b[1] - b[0]))
-    part = normal @ (b[0] - a[0]) / (normal @ along)
-    return np.asarray(a[0] + min(max(part, 0.0), 1.0) * along)
+    """
+    Return the point of a segment that is nearest to the line of another, (2, 3) each.
+
+    Where they are parallel but for rounding it is the middle of what they have in common.
+    """
+    along, other = _direction(a), _direction(b)
+    length, *ends = ((x - a[0]) @ along for x in (a[1], *b))
+    normal = np.cross(other, np.cross(along, other))
+    slope = normal @ along
+    if slope > PARALLEL:
+        ends = [normal @ (b[0] - a[0]) / slope]
+    return np.asarray(a[0] + np.clip(ends, 0.0, length).mean() * along)
+
+
+def _direction(segment: np.ndarray) -> np.ndarray:
+    """Return the unit vector from tail to head, 0 if rounding has made them one."""
+    along = segment[1] - segment[0]
+    # No square of a small body's edge underflows in `hypot`.
+    return np.asarray(along / (math.hypot(*along.tolist()) or 1.0))

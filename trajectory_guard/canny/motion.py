@@ -98,7 +98,9 @@ def rotation(quaternion: np.ndarray) -> np.ndarray:
 
     :param quaternion: scalar first, (4,).
     """
-    w, x, y, z = quaternion / np.linalg.norm(quaternion)
+    # Between ends of opposite signs a curve may come so near to 0 that squares underflow.
+    near_unit = quaternion / np.abs(quaternion).max()
+    w, x, y, z = near_unit / np.linalg.norm(near_unit)
     return np.array(
         [
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
