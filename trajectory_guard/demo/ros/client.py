@@ -7,6 +7,7 @@ from typing import Any
 
 from builtin_interfaces.msg import Duration
 import rclpy
+from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
@@ -28,12 +29,15 @@ class GuardClient:
     Asks the guard.
 
     :param node: node to ask from; the guard's node lives in its namespace.
+    :param executor: has that node.
     :param check: called again and again while waiting; it raises if waiting is no use.
     :param timeout: how long an answer may take [s].
     """
 
-    def __init__(self, node: Node, check: Callable[[], None], timeout: float) -> None:
-        self._node = node
+    def __init__(
+        self, node: Node, executor: Executor, check: Callable[[], None], timeout: float
+    ) -> None:
+        self._executor = executor
         self._check = check
         self._timeout = timeout
         self._client = node.create_client(CertifyTrajectory, 'guard/certify')
@@ -75,13 +79,13 @@ class GuardClient:
         """Return the CertificationResult that answers a request."""
         deadline = time.monotonic() + self._timeout
         future = self._client.call_async(request)
-        while True:
-            rclpy.spin_until_future_complete(self._node, future, timeout_sec=_SLICE)
-            if future.done():
-                return future.result().result
+        while not future.done():
+            # (Spinning until a future is complete leaves something behind at each call.)
+            self._executor.spin_once(timeout_sec=_SLICE)
             self._check()
-            if time.monotonic() > deadline:
+            if not future.done() and time.monotonic() > deadline:
                 raise DemoError(f'the guard does not answer within {self._timeout:g} s')
+        return future.result().result
 
 
 @contextmanager
@@ -98,9 +102,12 @@ def connected_client(
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = rclpy.create_node('demo', namespace=namespace)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
         try:
-            yield GuardClient(node, check, timeout)
+            yield GuardClient(node, executor, check, timeout)
         finally:
+            executor.shutdown()
             node.destroy_node()
     finally:
         rclpy.shutdown()
