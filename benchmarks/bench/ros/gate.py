@@ -40,11 +40,11 @@ class Rig:
         }
         self.arrived: float | None = None
         self.decision: GateDecision | None = None
-        self.ready = False
+        self._status = GateStatus()
         for topic in (OUTPUT, DIRECT):
             node.create_subscription(JointTrajectory, topic, self._arrive, 10)
         node.create_subscription(GateDecision, '/gate/decision', self._decide, 10)
-        node.create_subscription(GateStatus, '/gate/status', self._say_ready, LATCHED)
+        node.create_subscription(GateStatus, '/gate/status', self._take_status, LATCHED)
         node.create_timer(STATE_PERIOD, self._say_state)
 
     def _arrive(self, _: JointTrajectory) -> None:
@@ -53,8 +53,8 @@ class Rig:
     def _decide(self, decision: GateDecision) -> None:
         self.decision = decision
 
-    def _say_ready(self, status: GateStatus) -> None:
-        self.ready = status.ready
+    def _take_status(self, status: GateStatus) -> None:
+        self._status = status
 
     def _say_state(self) -> None:
         self._state.header.stamp = self._node.get_clock().now().to_msg()
@@ -70,7 +70,7 @@ class Rig:
         )
         until = time.monotonic() + 5 * STATE_PERIOD
         self.spin(lambda: time.monotonic() > until)
-        self.spin(lambda: self.ready)
+        self.spin(lambda: self._status.ready)
 
     def ms(self, way: str, case: Case) -> float | None:
         """Return the time from publishing to the controller [ms]; None: it was held."""
@@ -100,7 +100,7 @@ class Rig:
         while not done():
             self._executor.spin_once(STATE_PERIOD)
             if time.monotonic() > deadline:
-                raise RuntimeError(f'nothing passes the gate: ready is {self.ready}')
+                raise RuntimeError(f'nothing passes the gate: {self._status.message}')
 
 
 def gate(cases: Sequence[Case], requests: int) -> Iterator[dict]:

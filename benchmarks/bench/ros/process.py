@@ -64,9 +64,9 @@ def running(command: Sequence[str]) -> Iterator[subprocess.Popen[bytes]]:
             code = process.poll()
             process.terminate()
             process.wait()
-        if code is not None:
-            log.seek(0)
-            raise RuntimeError(f'{command[0]} ended with code {code}\n{log.read().decode()}')
+            if code is not None:
+                log.seek(0)
+                raise RuntimeError(f'{command[0]} ended with code {code}\n{log.read().decode()}')
 
 
 def resident_mb(pid: int) -> float:
