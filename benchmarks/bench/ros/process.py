@@ -11,6 +11,9 @@ import tempfile
 from bench.built import PANDA, SCENE
 from trajectory_guard.demo.files import config_file, guard_executable
 
+# How long a process may take to stop before it is killed [s].
+GRACE = 5.0
+
 ECHO = Path(__file__).with_name('echo.py')
 
 
@@ -62,11 +65,20 @@ def running(command: Sequence[str]) -> Iterator[subprocess.Popen[bytes]]:
             yield process
         finally:
             code = process.poll()
-            process.terminate()
-            process.wait()
+            stop(process)
             if code is not None:
                 log.seek(0)
                 raise RuntimeError(f'{command[0]} ended with code {code}\n{log.read().decode()}')
+
+
+def stop(process: subprocess.Popen[bytes]) -> None:
+    """End a process, the hard way if it does not listen."""
+    process.terminate()
+    try:
+        process.wait(GRACE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 def resident_mb(pid: int) -> float:
