@@ -17,6 +17,7 @@ from trajectory_guard.result import Verdict
 
 # A request without an answer by then is lost [s].
 PATIENCE = 20.0
+PATIENCE_AT_FIRST = 0.2
 
 
 class Answer(NamedTuple):
@@ -69,29 +70,37 @@ class Client:
         self._executor = executor
         self._client = node.create_client(CertifyTrajectory, f'/{server}/certify')
 
-    def wait(self) -> None:
+    def connect(self, request: CertifyTrajectory.Request) -> None:
         """
-        Return as soon as somebody listens.
+        Return as soon as a request is answered.
 
-        :raises RuntimeError: nobody does.
+        DDS sees a server before the server sees where to answer; a request that comes too early is
+        never answered.
+
+        :raises RuntimeError: none is.
         """
         deadline = time.monotonic() + PATIENCE
-        while not self._client.service_is_ready():
-            if time.monotonic() > deadline:
-                raise RuntimeError(f'nobody answers {self._client.srv_name}')
-            time.sleep(0.002)
+        while time.monotonic() < deadline:
+            if not self._client.service_is_ready():
+                time.sleep(0.002)
+            elif self.ask(request, PATIENCE_AT_FIRST).result:
+                return
+        raise RuntimeError(f'nobody answers {self._client.srv_name}')
 
-    def ask(self, request: CertifyTrajectory.Request) -> Answer:
+    def ask(self, request: CertifyTrajectory.Request, patience: float = PATIENCE) -> Answer:
         """
         Return the answer to a request.
 
         Not by spin_until_future_complete: each of its turns leaves a callback in the future that
         is one more turn for the next call, which costs milliseconds after a few calls.
+
+        :param request: what is asked.
+        :param patience: without an answer by then, it is lost [s].
         """
         begin = time.perf_counter()
         future = self._client.call_async(request)
-        while not future.done() and time.perf_counter() < begin + PATIENCE:
-            self._executor.spin_once(PATIENCE)
+        while not future.done() and time.perf_counter() < begin + patience:
+            self._executor.spin_once(patience)
         ms = 1e3 * (time.perf_counter() - begin)
         if future.done():
             return Answer(ms, future.result().result)

@@ -34,7 +34,7 @@ def round_trip(requests: int) -> Iterator[dict]:
     with spinning() as (node, executor), running(guard_command()), running(echo_command()):
         clients = {name: Client(node, executor, name) for name in SERVERS}
         for client in clients.values():
-            client.wait()
+            client.connect(request_for(cases[0]))
         for i in range(WARM_UP + requests):
             for name, client in clients.items():
                 answer = client.ask(request_for(cases[i % len(cases)]))
@@ -85,7 +85,7 @@ def ask_many(requests: int) -> dict:
     cases = panda()
     with spinning() as (node, executor):
         client = Client(node, executor, 'guard')
-        client.wait()
+        client.connect(request_for(cases[0]))
         found = [client.ask(request_for(cases[i % len(cases)])) for i in range(requests)]
     answered = [answer for answer in found if answer.result]
     return {
@@ -105,12 +105,8 @@ def start(_: int) -> Iterator[dict]:
             for _ in range(STARTS):
                 begin = time.perf_counter()
                 with running(command()):
-                    client = Client(node, executor, name)
-                    client.wait()
-                    answer = client.ask(request_for(case))
+                    Client(node, executor, name).connect(request_for(case))
                     seconds.append(time.perf_counter() - begin)
-                if answer.result is None:
-                    raise RuntimeError(f'{name} does not answer')
         row = {
             'table': 'start',
             'server': name,
