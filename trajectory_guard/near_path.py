@@ -1,5 +1,6 @@
 """How far a joint position is off a trajectory's path during a span of time."""
 
+from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -32,7 +33,7 @@ def farthest(trajectory: Trajectory, q: np.ndarray, window_ns: tuple[int, int]) 
         coefficients, error = hermite(_knots(trajectory))
         bounds = [
             _in_segment(coefficients[i], error[i], q, (low - a) / (b - a), (high - a) / (b - a))
-            for i, (a, b) in enumerate(zip(times_ns[:-1], times_ns[1:], strict=True))
+            for i, (a, b) in enumerate(pairwise(times_ns))
             if a <= high and b >= low
         ]
     largest: np.ndarray = np.max(bounds, axis=0)

@@ -87,7 +87,7 @@ class Takeover:
 
     **Why a free path with this much more tracking tolerance covers what is played.** The
     trajectory's own segments are played as they are certified: only the instant at which they
-    begin may differ, which nothing that stands still takes notice of. What differs is the approach.
+    begin may differ, which no obstacle that stands still takes notice of. The approach may differ.
     With s in [0, 1] it is the Hermite polynomial
 
         q(s) = h00(s) q0 + h01(s) q1 + T (h10(s) v0 + h11(s) v1),
@@ -260,7 +260,9 @@ def takeover(
             for distance in off
         )
     else:
-        _check_start(names, _off_path(trajectory, stamp_ns, now_ns, positions, allowance), allowance)
+        _check_start(
+            names, _off_path(trajectory, stamp_ns, now_ns, positions, allowance), allowance
+        )
         cover = (allowance.allowed_start_tolerance,) * len(names)
     return Takeover(
         trajectory=trajectory,
@@ -381,8 +383,8 @@ def _approach_cover(
     allowance: Allowance,
 ) -> tuple[float, ...]:
     """Return the bound of `Takeover` on what the approach may differ, (J,)."""
-    # What the controller computes for a state less whole turns is another float: by less than 2^-37
-    # for so few turns, by the bound that `start_state.with_start` derives.
+    # What the controller computes for a state less whole turns is another float: off by less than
+    # 2^-37 for so few turns, by the bound that `start_state.with_start` derives.
     drift = allowance.max_drift + 2.0**-36 * bool(allowance.continuous_joints)
     if velocities is None:
         return (drift * _UP,) * len(trajectory.joint_names)

@@ -35,6 +35,8 @@ from trajectory_guard.ros.gatekeeper import Gatekeeper
 NAME = 'gate'
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+# Who comes late and asks for one sees the last; a burst of them is not thinned out.
+DECISIONS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 TRAJECTORIES = QoSProfile(depth=100)
 # Takes reliable publishers and others. Several of them, each with some joints, share the queue.
 STATES = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -66,7 +68,7 @@ class Gate(Node):
         configuration = GateConfiguration.from_values(self._values)
         self._counts = {'passed': 0, 'stops': 0, 'held': 0}
         self._said: tuple[Any, ...] | None = None
-        self._decisions = self.create_publisher(GateDecision, '~/decision', LATCHED)
+        self._decisions = self.create_publisher(GateDecision, '~/decision', DECISIONS)
         self._statuses = self.create_publisher(GateStatus, '~/status', LATCHED)
         try:
             self._connect(configuration)
@@ -111,8 +113,13 @@ class Gate(Node):
     # What comes in
 
     def _take_trajectory(self, raw: bytes) -> None:
+        try:
+            message = deserialize_message(raw, JointTrajectory)
+        except Exception as error:
+            self._keeper.refuse(f'no JointTrajectory: {error!r}')
+            return
         self._keeper.consider(
-            deserialize_message(raw, JointTrajectory),
+            message,
             # The bytes themselves: nothing can have changed on the way.
             forward=lambda: self._output.publish(raw),
             receiver=self._no_receiver,
@@ -154,8 +161,7 @@ class Gate(Node):
         else:
             kind = 'passed'
             self.get_logger().info(
-                f'passed: proved free {took}, {decision.result.compute_time:.4f} s of them in the '
-                f'proof'
+                f'passed: proved free {took}; the proof took {decision.result.compute_time:.4f} s'
             )
         self._counts[kind] += 1
         self._decisions.publish(decision)

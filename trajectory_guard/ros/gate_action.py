@@ -1,4 +1,5 @@
 """The action FollowJointTrajectory before the controller's own."""
+
 from typing import Any
 
 

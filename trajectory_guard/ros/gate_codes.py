@@ -9,7 +9,7 @@ PASSED = (Reason.PROVED_FREE, Reason.STOP)
 # decision is the guard's, or one of a trajectory that no controller could play.
 REMEDIES = {
     Reason.STATE_STALE: 'see that joint_states has every joint, with stamps of this clock',
-    Reason.STATE_INCOMPLETE: 'publish velocities, or set state_interfaces as the controller has it',
+    Reason.STATE_INCOMPLETE: 'publish velocities; set state_interfaces as the controller has it',
     Reason.STATE_CHANGED: 'send it when the robot stands still, or raise max_drift or '
     'max_velocity_drift, for which more clearance is needed',
     Reason.START_STATE_MISMATCH: 'plan from where the robot is now',

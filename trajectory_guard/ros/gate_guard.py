@@ -29,6 +29,7 @@ class GuardClient:
 
     def __init__(self, node: Node, guard: str, changed: Callable[[], None]) -> None:
         self._node = node
+        self._service = node.resolve_service_name(f'{guard}/certify')
         self._certify = node.create_client(CertifyTrajectory, f'{guard}/certify')
         self._parameters = node.create_client(GetParameters, f'{guard}/get_parameters')
         self._status: GuardStatus | None = None
@@ -37,7 +38,7 @@ class GuardClient:
 
     def missing(self) -> RequestError | None:
         """Return why the guard cannot be asked now; None: it can."""
-        name = self._certify.srv_name
+        name = self._service
         servers = self._node.count_services(name)
         if servers > 1:
             return RequestError(

@@ -44,7 +44,9 @@ DECLARATIONS = {
         [''], 'continuous joints, of which the controller does not count whole turns'
     ),
     'max_state_age': Declaration(
-        0.1, 'a joint state is fresh up to this age, by its stamp and by its arrival [s]', (1e-3, 10.0)
+        0.1,
+        'a joint state is fresh up to this age, by its stamp and by its arrival [s]',
+        (1e-3, 10.0),
     ),
     'max_drift': Declaration(
         0.002,
@@ -234,7 +236,7 @@ def declare(node: Node) -> dict[str, Any]:
         ]
     except ParameterException as error:
         raise _invalid(str(error)) from error
-    # ROS takes no notice of a name that no node declares. (There is no public way to ask for them.)
+    # ROS takes no notice of a name that no node declares, and has no public way to ask for them.
     unknown = [name for name in node._parameter_overrides if not node.has_parameter(name)]
     if unknown:
         raise _invalid(

@@ -31,9 +31,7 @@ def request_for(
     :raises TrajectoryError: a time does not fit a message.
     """
     return CertifyTrajectory.Request(
-        trajectory=JointTrajectory(
-            joint_names=message.joint_names, points=_points(message, plan)
-        ),
+        trajectory=JointTrajectory(joint_names=message.joint_names, points=_points(message, plan)),
         start_state=_start_state(plan),
         tracking_tolerance=[
             (own + more) * _UP for own, more in zip(tracking_tolerance, plan.cover, strict=True)
@@ -57,9 +55,7 @@ def _points(message: JointTrajectory, plan: Takeover) -> list[JointTrajectoryPoi
     ]
     if plan.entry is Entry.APPROACH:
         # It carries what the controller reads, so the guard takes the degree that it takes.
-        first = JointTrajectoryPoint(
-            positions=plan.positions, velocities=plan.velocities or ()
-        )
+        first = JointTrajectoryPoint(positions=plan.positions, velocities=plan.velocities or ())
         points.insert(0, first)
     return points
 
@@ -110,7 +106,10 @@ def _check(asked: CertifyTrajectory.Request, answer: Result) -> None:
         (answer.duration_ns != duration_ns, f'the duration {answer.duration_ns} ns'),
         (not answer.intervals, 'no intervals'),
         (starts != ends, 'intervals that are no partition of the duration'),
-        (any(i.status is not Status.FREE for i in answer.intervals), 'intervals that are not free'),
+        (
+            any(i.status is not Status.FREE for i in answer.intervals),
+            'intervals that are not free',
+        ),
         (not answer.clearance >= asked.clearance, f'the clearance {answer.clearance:g} m'),
         (answer.interpolation != INTERPOLATION, f'the interpolation {answer.interpolation!r}'),
         (not (answer.robot_hash and answer.scene_hash), 'no hash of the robot or the scene'),

@@ -81,9 +81,9 @@ class JointStates:
         fresh = self.fresh(steady_ns, now_ns, max_age_ns)
         for name, row in self._rows.items():
             if name not in fresh:
+                arrived, stamp = (steady_ns - row.arrived_ns) / 1e9, (now_ns - row.stamp_ns) / 1e9
                 return (
-                    f'the state of joint {name!r} arrived {(steady_ns - row.arrived_ns) / 1e9:.3f} s '
-                    f'ago, its stamp is {(now_ns - row.stamp_ns) / 1e9:.3f} s old; '
-                    f'max_state_age is {max_age_ns / 1e9:g} s'
+                    f'the state of joint {name!r} arrived {arrived:.3f} s ago, its stamp is '
+                    f'{stamp:.3f} s old; max_state_age is {max_age_ns / 1e9:g} s'
                 )
         return ''

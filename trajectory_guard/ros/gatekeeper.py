@@ -25,8 +25,8 @@ class Gatekeeper:
     Decides on one trajectory after the other; a newer one supersedes one that is undecided.
 
     All of it runs in one thread, so what is passed on comes in the order of the decisions. Each
-    step of a trial begins by asking whether the trial is still the one that is undecided: an answer
-    that comes after a stop, a newer trajectory or the end of its time finds that it is not.
+    step of a trial begins by asking whether the trial is still the one that is undecided: an
+    answer that comes after a stop, a newer trajectory or the end of its time finds that it is not.
 
     :param node: whose clock, log and executor are used.
     :param states: the robot's state.
@@ -76,6 +76,19 @@ class Gatekeeper:
         self._trial = trial
         self._step(trial, self._ask_least, trial)
         return trial
+
+    def refuse(self, message: str) -> None:
+        """
+        Hold something that is no trajectory; it supersedes one that is undecided all the same.
+
+        :param message: why it is none.
+        """
+        nothing = JointTrajectory()
+        now_ns = time.monotonic_ns()
+        trial = Trial(nothing, _never, str, lambda _: None, self.configuration, now_ns)
+        if self._trial is not None:
+            self._hold(self._trial, Reason.SUPERSEDED, 'something newer came')
+        self._hold(trial, Reason.TRAJECTORY_UNREADABLE, message)
 
     def void(self, trial: Trial, reason: Reason, message: str) -> None:
         """
@@ -231,3 +244,8 @@ class Gatekeeper:
     def _now(self) -> tuple[int, int]:
         """Return the time on the steady clock and on the node's [ns]."""
         return time.monotonic_ns(), self._node.get_clock().now().nanoseconds
+
+
+def _never() -> None:
+    """Pass on what must not be."""
+    raise AssertionError('this is not to be passed on')
