@@ -6,17 +6,37 @@ import math
 import os
 from pathlib import Path
 import subprocess
+import threading
 import time
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from guard_process import ENVIRONMENT, EXECUTABLE, GuardProcess, PATIENCE
+from guard_process import (
+    ENVIRONMENT,
+    EXECUTABLE,
+    GuardProcess,
+    PATIENCE,
+    ros_context,
+    spinning,
+)
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.context import Context
+from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
-from trajectory_guard_interfaces.msg import GateDecision, GateStatus
+from trajectory_guard_interfaces.msg import (
+    CertificationResult,
+    GateDecision,
+    GateStatus,
+    GuardStatus,
+    TimeInterval,
+)
+from trajectory_guard_interfaces.srv import CertifyTrajectory
 from trajectory_msgs.msg import JointTrajectory
+
+from trajectory_guard.joint_path import INTERPOLATION
 
 GATE = EXECUTABLE.with_name('gate')
 
@@ -55,7 +75,7 @@ def gate_process(folder: Path, namespace: str, *arguments: str) -> Iterator[Guar
             process.wait()
 
 
-def soon(condition: Callable[[], Any], what: str, patience: float = PATIENCE) -> Any:
+def soon(condition: Callable[[], Any], what: str, patience: float = 20.0) -> Any:
     """Wait until another thread has made something true, and return it."""
     end = time.monotonic() + patience
     while time.monotonic() < end:
@@ -64,6 +84,64 @@ def soon(condition: Callable[[], Any], what: str, patience: float = PATIENCE) ->
             return found
         time.sleep(0.002)
     raise AssertionError(f'in vain: {what}')
+
+
+class FakeGuard:
+    """
+    A guard that answers at will.
+
+    :param context: ROS.
+    :param namespace: where it lives.
+    """
+
+    def __init__(self, context: Context, namespace: str) -> None:
+        self.node = Node('guard', namespace=namespace, context=context)
+        self.node.declare_parameter('tracking_tolerance', [0.0])
+        self.node.declare_parameter('tracking_tolerance_joints', [''])
+        self.asked: list[CertifyTrajectory.Request] = []
+        self.change: Callable[[CertificationResult], None] = lambda result: None
+        self.go = threading.Event()
+        self.go.set()
+        self.node.create_service(
+            CertifyTrajectory,
+            '~/certify',
+            self._answer,
+            callback_group=MutuallyExclusiveCallbackGroup(),
+        )
+        latched = self.node.create_publisher(GuardStatus, '~/status', LATCHED)
+        latched.publish(GuardStatus(ready=True))
+
+    def _answer(
+        self, request: CertifyTrajectory.Request, response: CertifyTrajectory.Response
+    ) -> CertifyTrajectory.Response:
+        self.asked.append(request)
+        self.go.wait(PATIENCE)
+        end = request.trajectory.points[-1].time_from_start
+        response.result = CertificationResult(
+            verdict=CertificationResult.FREE,
+            intervals=[TimeInterval(status=TimeInterval.FREE, end=end)],
+            clearance=request.clearance,
+            interpolation=INTERPOLATION,
+            robot_hash='r',
+            scene_hash='s',
+            duration=end,
+        )
+        self.change(response.result)
+        return response
+
+
+@contextmanager
+def fake_guard(namespace: str) -> Iterator[FakeGuard]:
+    """Run a guard that answers at will, in threads of its own."""
+    with ros_context() as context:
+        executor = MultiThreadedExecutor(4, context=context)
+        guard = FakeGuard(context, namespace)
+        executor.add_node(guard.node)
+        with spinning(executor):
+            try:
+                yield guard
+            finally:
+                guard.go.set()
 
 
 class Bench:
@@ -120,7 +198,7 @@ class Bench:
                 and self.statuses[-1].reason_code in codes
             )
 
-        soon(met, 'the gate')
+        soon(met, "the gate", PATIENCE)
 
     def send(self, trajectory: JointTrajectory) -> None:
         """Send a trajectory to the gate."""
@@ -150,6 +228,10 @@ class Bench:
         """Return a stamp: now, or so much later [s]."""
         time_ns = self.node.get_clock().now().nanoseconds + round(later * 1e9)
         return Time(sec=time_ns // 10**9, nanosec=time_ns % 10**9)
+
+    def free(self, trajectory: JointTrajectory) -> None:
+        """Fail unless the trajectory passes."""
+        assert self.code(trajectory) == 'proved_free', self.decisions[-1].message
 
     def rest(self, q: Sequence[float]) -> None:
         """Put the robot there at once, at rest, and return when the gate should know."""

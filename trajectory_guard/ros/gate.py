@@ -8,6 +8,7 @@ import threading
 import time
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 import rclpy
 from rclpy.clock import Clock
@@ -31,6 +32,7 @@ from trajectory_guard.ros.gate_guard import GuardClient
 from trajectory_guard.ros.gate_parameters import declare, GateConfiguration, values_of
 from trajectory_guard.ros.gate_states import JointStates
 from trajectory_guard.ros.gatekeeper import Gatekeeper
+from trajectory_guard.ros.health import Health
 
 NAME = 'gate'
 
@@ -67,7 +69,8 @@ class Gate(Node):
         self._values = declare(self)
         configuration = GateConfiguration.from_values(self._values)
         self._counts = {'passed': 0, 'stops': 0, 'held': 0}
-        self._said: tuple[Any, ...] | None = None
+        self._said: tuple[bool, str, tuple[int, ...]] | None = None
+        self._health = Health(self, 'gate', self._state)
         self._decisions = self.create_publisher(GateDecision, '~/decision', DECISIONS)
         self._statuses = self.create_publisher(GateStatus, '~/status', LATCHED)
         try:
@@ -116,7 +119,7 @@ class Gate(Node):
         try:
             message = deserialize_message(raw, JointTrajectory)
         except Exception as error:
-            self._keeper.refuse(f'no JointTrajectory: {error!r}')
+            self._keeper.refuse(Reason.TRAJECTORY_UNREADABLE, f'no trajectory: {error!r}')
             return
         self._keeper.consider(
             message,
@@ -165,6 +168,7 @@ class Gate(Node):
             )
         self._counts[kind] += 1
         self._decisions.publish(decision)
+        self._health.count(kind, code, decision.latency, words)
         self._look_at_status()
 
     def _look_at_status(self) -> None:
@@ -182,6 +186,7 @@ class Gate(Node):
                 self.get_logger().info('ready')
             else:
                 self.get_logger().warning(f'not ready: {code}: {words}; {remedy(code)}')
+            self._health.changed()
         self._said = said
         self._statuses.publish(
             GateStatus(
@@ -192,6 +197,13 @@ class Gate(Node):
                 **self._counts,
             )
         )
+
+    def _state(self) -> tuple[bytes, str]:
+        """Return level and text for the diagnostics."""
+        missing = self._missing()
+        if missing is None:
+            return DiagnosticStatus.OK, 'ready'
+        return DiagnosticStatus.WARN, f'closed: {missing.reason}: {missing}'
 
     def _missing(self) -> TrajectoryGuardError | None:
         """Return what is missing for anything to be passed on; None: nothing."""

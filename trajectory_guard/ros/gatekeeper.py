@@ -77,10 +77,11 @@ class Gatekeeper:
         self._step(trial, self._ask_least, trial)
         return trial
 
-    def refuse(self, message: str) -> None:
+    def refuse(self, reason: Reason, message: str) -> None:
         """
-        Hold something that is no trajectory; it supersedes one that is undecided all the same.
+        Hold what is no joint trajectory; it supersedes one that is undecided all the same.
 
+        :param reason: stable code.
         :param message: why it is none.
         """
         nothing = JointTrajectory()
@@ -88,7 +89,7 @@ class Gatekeeper:
         trial = Trial(nothing, _never, str, lambda _: None, self.configuration, now_ns)
         if self._trial is not None:
             self._hold(self._trial, Reason.SUPERSEDED, 'something newer came')
-        self._hold(trial, Reason.TRAJECTORY_UNREADABLE, message)
+        self._hold(trial, reason, message)
 
     def void(self, trial: Trial, reason: Reason, message: str) -> None:
         """
