@@ -142,6 +142,8 @@ def fake_guard(namespace: str) -> Iterator[FakeGuard]:
                 yield guard
             finally:
                 guard.go.set()
+                executor.remove_node(guard.node)
+                guard.node.destroy_node()
 
 
 class Bench:
@@ -198,7 +200,7 @@ class Bench:
                 and self.statuses[-1].reason_code in codes
             )
 
-        soon(met, "the gate", PATIENCE)
+        soon(met, 'the gate', PATIENCE)
 
     def send(self, trajectory: JointTrajectory) -> None:
         """Send a trajectory to the gate."""

@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 import signal
 import time
+from typing import Any
 
 from builtin_interfaces.msg import Duration, Time
 from gate_process import Bench, fake_guard, FakeGuard, gate_process, PERIOD, soon
@@ -16,10 +17,12 @@ from guard_process import (
     GuardProcess,
     message,
     parameters,
+    PATIENCE,
     SCENE,
 )
 import numpy as np
 import pytest
+from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 from trajectory_guard_interfaces.msg import CertificationResult, GateDecision, TimeInterval
@@ -95,7 +98,7 @@ def fake(files: Path) -> Iterator[FakeGuard]:
 
 @pytest.fixture(scope='module')
 def faked(files: Path, ask: Asker, fake: FakeGuard) -> Iterator[Bench]:
-    """A gate that asks the guard that answers at will."""
+    """Yield what stands around a gate that asks the guard which answers at will."""
     arguments = parameters(clearance=0.01, deadline=0.3, max_drift=0.01)
     with gate_process(files, 'fake', *arguments) as process:
         made = Bench(ask.node, 'fake')
@@ -303,8 +306,6 @@ def test_what_is_asked(faked: Bench, fake: FakeGuard) -> None:
 
 
 def test_the_guard_wants_more_tracking_tolerance(faked: Bench, fake: FakeGuard) -> None:
-    from rclpy.parameter import Parameter
-
     def set_to(values: list[float], joints: list[str]) -> None:
         fake.node.set_parameters_atomically(
             [
@@ -387,3 +388,167 @@ def test_status_follows(faked: Bench) -> None:
     soon(lambda: faked.statuses[-1].ready, 'ready again')
     counts = faked.statuses[-1]
     assert counts.passed + counts.stops + counts.held == len(faked.decisions)
+
+
+# A guard that ends, and clocks
+
+
+def test_a_guard_that_is_killed_meanwhile(files: Path, ask: Asker, workcell: list[str]) -> None:
+    with gate_process(files, 'mortal', *parameters(deadline=0.3)) as gate:
+        made = Bench(ask.node, 'mortal')
+        made.wait(gate, 'guard_missing')
+        assert made.code(FREE) == 'guard_missing'
+        with guard_process(files, 'mortal', *workcell) as guard:
+            soon(lambda: made.statuses[-1].reason_code in READY, 'the guard', PATIENCE)
+            made.free(FREE)
+            guard.process.send_signal(signal.SIGSTOP)
+            count = len(made.decisions)
+            made.send(FREE)
+            time.sleep(0.1)
+            guard.process.kill()
+            soon(lambda: len(made.decisions) > count, 'a decision')
+            assert made.decisions[-1].reason_code == 'guard_silent'
+        assert_in_order(made)
+        assert made.code(STOP) == 'stop'
+        assert gate.stop(signal.SIGINT) == 0
+
+
+def test_states_that_never_came(files: Path, ask: Asker, fake: FakeGuard) -> None:
+    arguments = parameters(guard='/fake/guard', joint_states_topic='nobody')
+    with gate_process(files, 'without', *arguments) as gate:
+        made = Bench(ask.node, 'without')
+        soon(lambda: made.statuses and made.statuses[-1].reason_code == 'state_stale', 'a status')
+        assert 'no joint state' in made.statuses[-1].message
+        soon(lambda: made.sender.get_subscription_count() == 1, 'the gate')
+        assert made.code(FREE) == 'state_stale'
+        assert gate.process.poll() is None
+
+
+def test_a_clock_that_jumps(files: Path, ask: Asker) -> None:
+    clock = ask.node.create_publisher(Clock, '/simulated/clock', 1)
+    remap = ['-r', '/clock:=/simulated/clock', '-p', 'use_sim_time:=true']
+
+    def tell(seconds: int) -> None:
+        clock.publish(Clock(clock=Time(sec=seconds)))
+        time.sleep(0.1)
+
+    with fake_guard('simulated'), gate_process(files, 'simulated', *remap) as gate:
+        made = Bench(ask.node, 'simulated')
+        made.wait(gate, 'state_stale')
+        soon(lambda: clock.get_subscription_count() == 1, 'the gate')
+        # Wall clock stamps while the simulated clock has not begun.
+        assert made.code(FREE) == 'state_stale'
+        made.stamp_ns = lambda: 1000 * 10**9
+        tell(1000)
+        made.free(FREE)
+        for seconds in (2000, 500, 0, 999):
+            tell(seconds)
+            assert made.code(FREE) == 'state_stale'
+        tell(1000)
+        made.free(FREE)
+        # The clock stands still, and so do the stamps, but nothing arrives any more.
+        made.tells = False
+        time.sleep(0.2)
+        assert made.code(FREE) == 'state_stale'
+        assert_in_order(made)
+
+
+def test_a_deadline_that_is_too_short(files: Path, ask: Asker, fake: FakeGuard) -> None:
+    arguments = parameters(guard='/fake/guard', deadline=0.001, answer_margin=0.0)
+    with gate_process(files, 'tight', *arguments) as gate:
+        made = Bench(ask.node, 'tight')
+        made.wait(gate, '')
+        fake.go.clear()
+        assert made.code(FREE) == 'guard_silent'
+        fake.go.set()
+
+
+def test_nobody_listens(files: Path, ask: Asker, fake: FakeGuard) -> None:
+    arguments = parameters(guard='/fake/guard', output_topic='elsewhere')
+    with gate_process(files, 'deaf', *arguments):
+        made = Bench(ask.node, 'deaf')
+        soon(
+            lambda: made.statuses and made.statuses[-1].reason_code == 'controller_missing',
+            'the status',
+        )
+        soon(lambda: made.sender.get_subscription_count() == 1, 'the gate')
+        assert made.code(FREE) == 'controller_missing'
+
+
+# Many
+
+
+def nonsense(rng: np.random.Generator, bench: Bench) -> JointTrajectory:
+    """Return a trajectory of which several things may be wrong, and some are not."""
+
+    def often(good: Any, *bad: Any) -> Any:
+        return good if rng.random() < 0.95 else bad[rng.integers(len(bad))]
+
+    names = often(
+        ['shoulder', 'elbow'], ['elbow', 'shoulder'], ['elbow'], [], ['a', 'b'], ['', '']
+    )
+    first = often(0.0, 0.5, 3.0) if rng.random() < 0.5 else 1.0
+    carried = rng.integers(0, 3)
+    made = JointTrajectory(joint_names=names)
+    made.header.stamp = often(Time(), bench.now(1.0), bench.now(-1.0), Time(sec=-1), Time(sec=1))
+    for i in range(often(2, 1, 3, 20)):
+        size = often(len(names), 1, 3)
+        q = 2.0 * rng.uniform(-1, 1) * np.ones(size) if i or first else np.zeros(size)
+        point = JointTrajectoryPoint(positions=often(q.tolist(), [], [math.nan] * size, [1e308]))
+        if carried:
+            point.velocities = often([0.0] * size, [], [1.0] * size, [math.inf] * size)
+        if carried == 2:
+            point.accelerations = often([0.0] * size, [], [-2.0] * size, [math.nan] * size)
+        seconds = often(first + i, 0.0, -1.0, 1e6)
+        point.time_from_start = Duration(sec=int(seconds), nanosec=int(seconds % 1 * 1e9))
+        made.points.append(point)
+    return made
+
+
+def is_proved(cell: Workcell, trajectory: JointTrajectory, stamp_ns: int, now_ns: int) -> bool:
+    """Return whether the library proves what the controller would play, the robot at rest."""
+    configuration = GateConfiguration.from_values(
+        {name: declaration.default for name, declaration in DECLARATIONS.items()}
+    )
+    state = {name: Measured(0.0, 0.0, 0) for name in ('shoulder', 'elbow')}
+    plan = takeover(
+        trajectory_from_message(trajectory), stamp_ns, now_ns, state, configuration.allowance
+    )
+    asked = request_for(trajectory, plan, [0.0] * len(trajectory.joint_names))
+    settings = Settings(tracking_tolerance=tuple(asked.tracking_tolerance))
+    start = joint_state_from_message(asked.start_state) if asked.start_state.name else None
+    verdict = judge(cell, trajectory_from_message(asked.trajectory), start, settings).verdict
+    return verdict is Verdict.FREE
+
+
+def test_nothing_but_what_is_proved_passes_of_a_thousand(bench: Bench, files: Path) -> None:
+    cell = Workcell(load_robot(files / 'arm.urdf'), load_scene([files / 'scene.urdf']))
+    rng = np.random.default_rng(7)
+    codes: dict[str, int] = {}
+    for _ in range(1000):
+        trajectory = nonsense(rng, bench)
+        code = bench.code(trajectory)
+        codes[code] = codes.get(code, 0) + 1
+        if code == 'proved_free':
+            now_ns = nanoseconds(bench.now())
+            assert is_proved(cell, trajectory, stamp_from_message(trajectory), now_ns)
+    # The cases are not all alike.
+    assert codes['proved_free'] > 50
+    assert codes['collision'] > 20
+    assert len(codes) > 10
+
+
+def nanoseconds(stamp: Time) -> int:
+    return stamp.sec * 10**9 + stamp.nanosec
+
+
+def test_a_burst_is_decided_in_order(bench: Bench) -> None:
+    count = len(bench.decisions)
+    rng = np.random.default_rng(3)
+    cases = [FREE, HIT, STOP, APPROACHED]
+    for k in rng.integers(0, len(cases), 80):
+        bench.send(cases[k])
+        time.sleep(0.002 * rng.integers(0, 3))
+    soon(lambda: len(bench.decisions) == count + 80, 'all decisions')
+    codes = {d.reason_code for d in bench.decisions[count:]}
+    assert {'superseded', 'stop', 'proved_free'} <= codes
