@@ -13,6 +13,7 @@ from rcl_interfaces.msg import SetParametersResult
 import rclpy
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
+from rclpy.exceptions import NameValidationException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
@@ -75,7 +76,7 @@ class Gate(Node):
         self._statuses = self.create_publisher(GateStatus, '~/status', LATCHED)
         try:
             self._connect(configuration)
-        except (RuntimeError, ValueError) as error:
+        except (RuntimeError, NameValidationException) as error:
             raise RequestError(
                 Reason.INVALID_PARAMETER, f'a topic or the guard: {" ".join(str(error).split())}'
             ) from error

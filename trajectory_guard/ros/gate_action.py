@@ -25,12 +25,16 @@ class _Goal:
     :param trial: what is decided about; None: nothing.
     :param controller: towards the controller; None: it has not accepted the goal yet.
     :param canceling: the client wants it to end.
+    :param status: how it ended (of action_msgs/msg/GoalStatus).
+    :param result: what it ended with; None: it has not.
     """
 
     handle: ServerGoalHandle
     trial: Trial | None = None
     controller: Any = None
     canceling: bool = False
+    status: int = GoalStatus.STATUS_UNKNOWN
+    result: Any = None
 
 
 class ActionGate:
@@ -59,7 +63,7 @@ class ActionGate:
             node,
             action,
             '~/follow_joint_trajectory',
-            execute_callback=None,
+            execute_callback=self._finish,
             handle_accepted_callback=self._begin,
             cancel_callback=self._cancel,
         )
@@ -136,20 +140,20 @@ class ActionGate:
         return CancelResponse.ACCEPT
 
     def _end(self, goal: _Goal, status: int, result: Any) -> None:
-        """Give the client the result."""
-        if self._goals.pop(_key(goal.handle), None) is None:
-            return
+        """Give the client the result, as soon as a cancellation that is being taken is."""
+        if goal.result is None:
+            goal.status, goal.result = status, result
+            goal.handle.execute()
 
-        def finish(handle: ServerGoalHandle) -> Any:
-            if status == GoalStatus.STATUS_SUCCEEDED:
-                handle.succeed()
-            elif status == GoalStatus.STATUS_CANCELED and handle.is_cancel_requested:
-                handle.canceled()
-            else:
-                handle.abort()
-            return result
-
-        goal.handle.execute(finish)
+    def _finish(self, handle: ServerGoalHandle) -> Any:
+        goal = self._goals.pop(_key(handle))
+        if goal.status == GoalStatus.STATUS_SUCCEEDED:
+            handle.succeed()
+        elif goal.status == GoalStatus.STATUS_CANCELED and handle.is_cancel_requested:
+            handle.canceled()
+        else:
+            handle.abort()
+        return goal.result
 
     def _refusal(self, reason: str, message: str) -> Any:
         """Return a result of the action that says why a goal was not passed on."""
