@@ -62,6 +62,7 @@ class LiveScene:
         limits: MarkerLimits | None = None,
         frames: Callable[[], Frames | None] = lambda: None,
     ) -> None:
+        self._node = node
         self._on_change = on_change
         self._limits = limits or MarkerLimits()
         self._frames = frames
@@ -90,6 +91,10 @@ class LiveScene:
     def topic(self) -> str:
         """The full name of the topic."""
         return str(self._subscription.topic_name)
+
+    def destroy(self) -> None:
+        """Stop listening."""
+        self._node.destroy_subscription(self._subscription)
 
     def _take(self, message: MarkerArray) -> None:
         self._state = self._after(message)
