@@ -24,9 +24,9 @@ THREADS = MOST_REQUESTS + 16
 # How long a signal may go unnoticed [s].
 LOOK_UP = 0.2
 
-# How long requests in flight may take to end when the guard stops [s], and their answers to leave.
+# How long requests in flight may take to end when the guard stops, and an answer to leave [s].
 GRACE = 2.0
-SENDING = 0.5
+SENDING = 0.05
 
 BAD_INPUT = 2
 INTERNAL_ERROR = 3
@@ -72,14 +72,21 @@ def _start_ros(args: list[str]) -> None:
 
 
 def _serve() -> None:
-    """Answer requests until a signal comes; what is in flight then has a little time to end."""
     executor = MultiThreadedExecutor(THREADS)
     guard = Guard()
     executor.add_node(guard)
+    try:
+        _answer_until_stopped(executor, guard)
+    finally:
+        executor.shutdown()
+        guard.destroy_node()
+
+
+def _answer_until_stopped(executor: MultiThreadedExecutor, guard: Guard) -> None:
+    """Answer requests until a signal comes; what is in flight then has a little time to end."""
     stop = threading.Event()
     _on_signal(stop.set)
-    if guard.configuration.autostart:
-        executor.create_task(guard.start)
+    started = executor.create_task(guard.start) if guard.configuration.autostart else None
     # Python handles a signal when the main thread comes back to it, which no signal hastens. (The
     # handlers of rclpy wake the executor before the context is invalid: it may sleep on for ever.)
     while not stop.is_set():
@@ -87,7 +94,9 @@ def _serve() -> None:
     guard.close()
     end = time.monotonic() + GRACE
     while not guard.idle and time.monotonic() < end:
-        executor.spin_once(timeout_sec=LOOK_UP / 10)
-    if not executor.shutdown(SENDING) or not guard.idle:
+        executor.spin_once(timeout_sec=SENDING)
+    # The last answer is made, and leaves; shutting the executor down does not wait for it.
+    time.sleep(SENDING)
+    if not guard.idle or (started is not None and not started.done()):
         # A kernel cannot be interrupted, and Python would wait for its thread.
         os._exit(0)

@@ -66,8 +66,12 @@ class Guard(ManagedNode):
     def __init__(self, **options: Any) -> None:
         super().__init__(NAME, **options)
         self._made = time.monotonic()
-        self._values = declare(self)
-        self._configuration = self._checked(self._values)
+        try:
+            self._values = declare(self)
+            self._configuration = self._checked(self._values)
+        except TrajectoryGuardError:
+            self.destroy_node()
+            raise
         self._types = ros_message_types()
         self._admission = Admission()
         self._active = False

@@ -44,6 +44,11 @@ class ManagedNode(LifecycleNodeMixin, Node):
             State.TRANSITION_STATE_ACTIVATING,
         )
 
+    def destroy_node(self) -> None:
+        """Destroy the node, which its state machine keeps alive otherwise."""
+        super().destroy_node()
+        del self._state_machine
+
     def _change_if_possible(
         self, request: ChangeState.Request, response: ChangeState.Response
     ) -> ChangeState.Response:
