@@ -37,6 +37,7 @@ from trajectory_guard_interfaces.srv import CertifyTrajectory
 from trajectory_msgs.msg import JointTrajectory
 
 from trajectory_guard.joint_path import INTERPOLATION
+from trajectory_guard.ros.namesakes import STATUS
 
 GATE = EXECUTABLE.with_name('gate')
 
@@ -108,8 +109,15 @@ class FakeGuard:
             self._answer,
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
-        latched = self.node.create_publisher(GuardStatus, '~/status', LATCHED)
-        latched.publish(GuardStatus(ready=True))
+        self._status = self.node.create_publisher(GuardStatus, '~/status', STATUS)
+        self.say(ready=True)
+
+    def say(self, ready: bool, scene_hash: str = 's') -> None:
+        """Say how it is."""
+        words = {} if ready else {'reason_code': 'not_ready', 'message': 'so it is'}
+        self._status.publish(
+            GuardStatus(ready=ready, robot_hash='r', scene_hash=scene_hash, **words)
+        )
 
     def _answer(
         self, request: CertifyTrajectory.Request, response: CertifyTrajectory.Response

@@ -49,8 +49,6 @@ HIT = message((0.0, [0.0, 0.0]), (1.0, [1.9, 0.0]))
 APPROACHED = message((1.0, [0.2, 0.2]), (2.0, [0.5, 0.5]))
 STOP = JointTrajectory()
 
-READY = ('', 'guard_not_ready')
-
 
 @pytest.fixture(scope='module')
 def ask() -> Iterator[Asker]:
@@ -84,7 +82,7 @@ def guard(files: Path, ask: Asker, workcell: list[str]) -> Iterator[GuardProcess
 def bench(files: Path, ask: Asker, guard: GuardProcess) -> Iterator[Bench]:
     with gate_process(files, 'cell') as process:
         made = Bench(ask.node, 'cell')
-        made.wait(process, *READY)
+        made.wait(process, '')
         yield made
         assert process.stop(signal.SIGTERM) == 0
         assert 'Traceback' not in process.said()
@@ -283,6 +281,29 @@ def test_the_robot_moves_meanwhile(
     assert faked.decisions[-1].reason_code == code
 
 
+@pytest.mark.parametrize(
+    ('said', 'code'),
+    [
+        ({'ready': False}, 'guard_not_ready'),
+        ({'ready': True, 'scene_hash': 'another'}, 'scene_changed'),
+    ],
+)
+def test_the_guard_changes_meanwhile(
+    faked: Bench, fake: FakeGuard, said: dict[str, Any], code: str
+) -> None:
+    fake.go.clear()
+    count, asked = len(faked.decisions), len(fake.asked)
+    faked.send(APPROACHED)
+    soon(lambda: len(fake.asked) > asked, 'the request')
+    fake.say(**said)
+    time.sleep(0.05)
+    fake.go.set()
+    soon(lambda: len(faked.decisions) > count, 'a decision')
+    assert faked.decisions[-1].reason_code == code
+    fake.say(ready=True)
+    soon(lambda: faked.statuses[-1].ready, 'the status')
+
+
 def test_a_late_answer_counts_for_nothing(faked: Bench, fake: FakeGuard) -> None:
     fake.go.clear()
     begin = time.monotonic()
@@ -399,7 +420,7 @@ def test_a_guard_that_is_killed_meanwhile(files: Path, ask: Asker, workcell: lis
         made.wait(gate, 'guard_missing')
         assert made.code(FREE) == 'guard_missing'
         with guard_process(files, 'mortal', *workcell) as guard:
-            soon(lambda: made.statuses[-1].reason_code in READY, 'the guard', PATIENCE)
+            soon(lambda: made.statuses[-1].ready, 'the guard', PATIENCE)
             made.free(FREE)
             guard.process.send_signal(signal.SIGSTOP)
             count = len(made.decisions)

@@ -91,6 +91,7 @@ class Reason(str, Enum):
     GUARD_NOT_READY = 'guard_not_ready'
     GUARD_SILENT = 'guard_silent'
     ANSWER_INVALID = 'answer_invalid'
+    SCENE_CHANGED = 'scene_changed'
     CONTROLLER_MISSING = 'controller_missing'
 
     # The guard itself.

@@ -208,7 +208,7 @@ class Gate(Node):
 
     def _missing(self) -> TrajectoryGuardError | None:
         """Return what is missing for anything to be passed on; None: nothing."""
-        guard = self._guard.missing() or self._guard.not_ready()
+        guard = self._guard.missing()
         if guard is not None:
             return guard
         stale = self._states.complaint(

@@ -25,6 +25,7 @@ REMEDIES = {
     Reason.GUARD_NOT_READY: 'see the status and the log of the guard',
     Reason.GUARD_SILENT: 'see whether the guard lives; raise deadline if it needs longer',
     Reason.ANSWER_INVALID: 'see that gate and guard are of the same version',
+    Reason.SCENE_CHANGED: 'send it again: it was certified in another scene',
     Reason.CONTROLLER_MISSING: 'start the controller, or set output_topic or controller_action',
     Reason.INTERNAL_ERROR: 'report it, with the log of the gate',
 }

@@ -5,15 +5,14 @@ from typing import Any
 
 from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
+from rclpy.event_handler import QoSLivelinessChangedInfo, SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
-from trajectory_guard_interfaces.msg import GuardStatus
+from trajectory_guard_interfaces.msg import CertificationResult, GuardStatus
 from trajectory_guard_interfaces.srv import CertifyTrajectory
 
 from trajectory_guard.errors import Reason, RequestError
-
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+from trajectory_guard.ros.namesakes import STATUS
 
 _LEAST = ('tracking_tolerance', 'tracking_tolerance_joints')
 
@@ -33,34 +32,58 @@ class GuardClient:
         self._certify = node.create_client(CertifyTrajectory, f'{guard}/certify')
         self._parameters = node.create_client(GetParameters, f'{guard}/get_parameters')
         self._status: GuardStatus | None = None
+        self._alive = self._dead = 0
         self._changed = changed
-        node.create_subscription(GuardStatus, f'{guard}/status', self._take, LATCHED)
+        node.create_subscription(
+            GuardStatus,
+            f'{guard}/status',
+            self._take,
+            STATUS,
+            event_callbacks=SubscriptionEventCallbacks(liveliness=self._count),
+        )
 
     def missing(self) -> RequestError | None:
-        """Return why the guard cannot be asked now; None: it can."""
-        name = self._service
-        servers = self._node.count_services(name)
+        """Return why the guard cannot be asked now, or would refuse; None: it can."""
+        servers = self._servers()
         if servers > 1:
             return RequestError(
-                Reason.GUARD_AMBIGUOUS, f'{servers} nodes offer {name}: which of them is right?'
+                Reason.GUARD_AMBIGUOUS,
+                f'{servers} nodes offer {self._service}: which of them is right?',
             )
         if servers == 0 or not self._certify.service_is_ready():
-            return RequestError(Reason.GUARD_MISSING, f'no node offers {name}')
+            return RequestError(Reason.GUARD_MISSING, f'no node offers {self._service}')
         if not self._parameters.service_is_ready():
             return RequestError(
                 Reason.GUARD_MISSING, f'no node offers {self._parameters.srv_name}'
             )
-        return None
-
-    def not_ready(self) -> RequestError | None:
-        """Return why the guard says that it would refuse every request; None: it is ready."""
         if self._status is None:
             return RequestError(Reason.GUARD_NOT_READY, 'the guard has not said that it is ready')
         if not self._status.ready:
             return RequestError(
                 Reason.GUARD_NOT_READY,
-                f'the guard: {self._status.reason_code}: {self._status.message}',
+                f'the guard says {self._status.reason_code}: {self._status.message}',
             )
+        return None
+
+    def _servers(self) -> int:
+        """
+        Return how many living nodes offer the service.
+
+        One that was killed stays in the graph for 20 s or so, but the middleware knows sooner that
+        who publishes its status is dead. Only as many as are not among the living are taken off.
+        """
+        servers: int = self._node.count_services(self._service)
+        return servers - min(self._dead, max(servers - self._alive, 0))
+
+    def changed_since(self, result: CertificationResult) -> RequestError | None:
+        """Return what is not as it was for a result; None: all is."""
+        status = self._status or GuardStatus()
+        for what in ('robot', 'scene'):
+            then, now = (getattr(said, f'{what}_hash') for said in (result, status))
+            if then != now:
+                return RequestError(
+                    Reason.SCENE_CHANGED, f'certified was {what} {then}, the guard has {now}'
+                )
         return None
 
     def least_tracking_tolerance(self) -> Future:
@@ -77,6 +100,10 @@ class GuardClient:
         for client in (self._certify, self._parameters):
             if future is not None:
                 client.remove_pending_request(future)
+
+    def _count(self, event: QoSLivelinessChangedInfo) -> None:
+        self._alive, self._dead = event.alive_count, event.not_alive_count
+        self._changed()
 
     def _take(self, status: GuardStatus) -> None:
         self._status = status

@@ -167,6 +167,9 @@ class Gatekeeper:
             self._hold(trial, *refused, result)
             return
         self._check_surroundings(trial)
+        changed = self._guard.changed_since(result)
+        if changed is not None:
+            raise changed
         steady_ns, now_ns = self._now()
         trial.plan.check(
             now_ns, self._states.fresh(steady_ns, now_ns, trial.configuration.max_state_age_ns)
