@@ -347,9 +347,7 @@ class Guard(ManagedNode):
             self.get_logger().error(f'a request failed: {error!r}')
             internal = TrajectoryGuardError(Reason.INTERNAL_ERROR, f'internal error: {error!r}')
             result = Result.rejected(internal)
-            response = CertifyTrajectory.Response(
-                result=result_to_message(result, self._types)
-            )
+            response = CertifyTrajectory.Response(result=result_to_message(result, self._types))
         self._health.count(
             result.verdict.name.lower(),
             result.reason_code,
