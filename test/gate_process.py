@@ -202,13 +202,16 @@ class Bench:
             assert gate.process.poll() is None, gate.said()
             return (
                 self.sender.get_subscription_count() == 1
-                and self._states.get_subscription_count() == 1
+                and self._states.get_subscription_count() >= 1
                 and self.node.count_publishers(self.controller.topic_name) == 1
                 and bool(self.statuses)
                 and self.statuses[-1].reason_code in codes
             )
 
-        soon(met, 'the gate', PATIENCE)
+        try:
+            soon(met, 'the gate', PATIENCE)
+        except AssertionError:
+            raise AssertionError((self.statuses, gate.said())) from None
 
     def send(self, trajectory: JointTrajectory) -> None:
         """Send a trajectory to the gate."""

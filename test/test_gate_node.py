@@ -49,6 +49,9 @@ HIT = message((0.0, [0.0, 0.0]), (1.0, [1.9, 0.0]))
 APPROACHED = message((1.0, [0.2, 0.2]), (2.0, [0.5, 0.5]))
 STOP = JointTrajectory()
 
+# The robot of the tests is late on a busy machine.
+PATIENT = {'max_state_age': 0.4, 'max_drift': 0.01}
+
 
 @pytest.fixture(scope='module')
 def ask() -> Iterator[Asker]:
@@ -80,7 +83,7 @@ def guard(files: Path, ask: Asker, workcell: list[str]) -> Iterator[GuardProcess
 
 @pytest.fixture(scope='module')
 def bench(files: Path, ask: Asker, guard: GuardProcess) -> Iterator[Bench]:
-    with gate_process(files, 'cell') as process:
+    with gate_process(files, 'cell', *parameters(**PATIENT)) as process:
         made = Bench(ask.node, 'cell')
         made.wait(process, '')
         yield made
@@ -97,7 +100,7 @@ def fake(files: Path) -> Iterator[FakeGuard]:
 @pytest.fixture(scope='module')
 def faked(files: Path, ask: Asker, fake: FakeGuard) -> Iterator[Bench]:
     """Yield what stands around a gate that asks the guard which answers at will."""
-    arguments = parameters(clearance=0.01, deadline=0.3, max_drift=0.01)
+    arguments = parameters(clearance=0.01, deadline=0.3, **PATIENT)
     with gate_process(files, 'fake', *arguments) as process:
         made = Bench(ask.node, 'fake')
         made.wait(process, '')
@@ -150,7 +153,7 @@ def test_an_approach_is_certified(bench: Bench) -> None:
 
 def test_a_stop_passes_always(bench: Bench) -> None:
     bench.tells = False
-    time.sleep(0.2)
+    soon(lambda: bench.statuses[-1].reason_code == 'state_stale', 'the status')
     assert bench.code(STOP) == 'stop'
     assert bench.code(FREE) == 'state_stale'
     assert bench.code(JointTrajectory(joint_names=['x', 'x'])) == 'stop'
@@ -264,7 +267,6 @@ def test_a_stop_passes_during_a_certification_and_voids_it(faked: Bench, fake: F
         (lambda bench: bench.q.update(elbow=0.005), 'proved_free'),
         (lambda bench: bench.q.update(elbow=0.02), 'state_changed'),
         (lambda bench: bench.dq.update(elbow=0.5), 'state_changed'),
-        (lambda bench: setattr(bench, 'tells', False), 'state_stale'),
     ],
 )
 def test_the_robot_moves_meanwhile(
@@ -279,6 +281,21 @@ def test_the_robot_moves_meanwhile(
     fake.go.set()
     soon(lambda: len(faked.decisions) > count, 'a decision')
     assert faked.decisions[-1].reason_code == code
+
+
+def test_states_stop_meanwhile(files: Path, ask: Asker, fake: FakeGuard) -> None:
+    with gate_process(files, 'stopping', *parameters(guard='/fake/guard')) as gate:
+        made = Bench(ask.node, 'stopping')
+        made.wait(gate, '')
+        fake.go.clear()
+        asked = len(fake.asked)
+        made.send(FREE)
+        soon(lambda: len(fake.asked) > asked, 'the request')
+        made.tells = False
+        time.sleep(0.3)
+        fake.go.set()
+        soon(lambda: made.decisions, 'a decision')
+        assert made.decisions[-1].reason_code == 'state_stale'
 
 
 @pytest.mark.parametrize(
@@ -415,7 +432,7 @@ def test_status_follows(faked: Bench) -> None:
 
 
 def test_a_guard_that_is_killed_meanwhile(files: Path, ask: Asker, workcell: list[str]) -> None:
-    with gate_process(files, 'mortal', *parameters(deadline=0.3)) as gate:
+    with gate_process(files, 'mortal', *parameters(deadline=0.3, **PATIENT)) as gate:
         made = Bench(ask.node, 'mortal')
         made.wait(gate, 'guard_missing')
         assert made.code(FREE) == 'guard_missing'
@@ -447,7 +464,7 @@ def test_states_that_never_came(files: Path, ask: Asker, fake: FakeGuard) -> Non
 
 def test_a_clock_that_jumps(files: Path, ask: Asker) -> None:
     clock = ask.node.create_publisher(Clock, '/simulated/clock', 1)
-    remap = ['-r', '/clock:=/simulated/clock', '-p', 'use_sim_time:=true']
+    remap = ['-r', '/clock:=/simulated/clock', *parameters(use_sim_time=True, **PATIENT)]
 
     def tell(seconds: int) -> None:
         clock.publish(Clock(clock=Time(sec=seconds)))
@@ -469,7 +486,7 @@ def test_a_clock_that_jumps(files: Path, ask: Asker) -> None:
         made.free(FREE)
         # The clock stands still, and so do the stamps, but nothing arrives any more.
         made.tells = False
-        time.sleep(0.2)
+        time.sleep(0.5)
         assert made.code(FREE) == 'state_stale'
         assert_in_order(made)
 
@@ -529,7 +546,7 @@ def nonsense(rng: np.random.Generator, bench: Bench) -> JointTrajectory:
 def is_proved(cell: Workcell, trajectory: JointTrajectory, stamp_ns: int, now_ns: int) -> bool:
     """Return whether the library proves what the controller would play, the robot at rest."""
     configuration = GateConfiguration.from_values(
-        {name: declaration.default for name, declaration in DECLARATIONS.items()}
+        {name: declaration.default for name, declaration in DECLARATIONS.items()} | PATIENT
     )
     state = {name: Measured(0.0, 0.0, 0) for name in ('shoulder', 'elbow')}
     plan = takeover(
