@@ -446,8 +446,15 @@ def test_a_guard_that_is_killed_meanwhile(files: Path, ask: Asker, workcell: lis
             guard.process.kill()
             soon(lambda: len(made.decisions) > count, 'a decision')
             assert made.decisions[-1].reason_code == 'guard_silent'
-        assert_in_order(made)
         assert made.code(STOP) == 'stop'
+        soon(lambda: made.statuses[-1].reason_code == 'guard_missing', 'the status')
+        # The dead one stays in the graph for longer than the new one needs.
+        begin = time.monotonic()
+        with guard_process(files, 'mortal', *workcell):
+            soon(lambda: made.statuses[-1].ready, 'the guard', PATIENCE)
+            made.free(FREE)
+            assert time.monotonic() - begin < 15.0
+        assert_in_order(made)
         assert gate.stop(signal.SIGINT) == 0
 
 

@@ -103,6 +103,9 @@ class GuardClient:
 
     def _count(self, event: QoSLivelinessChangedInfo) -> None:
         self._alive, self._dead = event.alive_count, event.not_alive_count
+        if not self._alive:
+            # What the dead have said holds for nobody.
+            self._status = None
         self._changed()
 
     def _take(self, status: GuardStatus) -> None:
