@@ -8,6 +8,7 @@ import time
 from typing import Any
 
 from builtin_interfaces.msg import Duration, Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from gate_process import Bench, fake_guard, FakeGuard, gate_process, PERIOD, soon
 from guard_process import (
     ARM,
@@ -34,13 +35,14 @@ from msg_adapters.trajectory import (
     trajectory_from_message,
 )
 from trajectory_guard.certify import judge
+from trajectory_guard.entry import Measured
 from trajectory_guard.errors import Reason
 from trajectory_guard.result import Verdict
 from trajectory_guard.ros.gate_parameters import DECLARATIONS, GateConfiguration
 from trajectory_guard.ros.gate_request import request_for
 from trajectory_guard.scene import load_scene
 from trajectory_guard.settings import Settings
-from trajectory_guard.takeover import Measured, takeover
+from trajectory_guard.takeover import takeover
 from trajectory_guard.urdf import load_robot
 from trajectory_guard.workcell import Workcell
 
@@ -426,6 +428,23 @@ def test_status_follows(faked: Bench) -> None:
     soon(lambda: faked.statuses[-1].ready, 'ready again')
     counts = faked.statuses[-1]
     assert counts.passed + counts.stops + counts.held == len(faked.decisions)
+
+
+def test_diagnostics(bench: Bench) -> None:
+    heard: list[DiagnosticArray] = []
+    bench.node.create_subscription(DiagnosticArray, '/diagnostics', heard.append, 10)
+    bench.free(FREE)
+
+    def told() -> bool:
+        return any(
+            status.name == 'cell/gate: gate'
+            and status.level == DiagnosticStatus.OK
+            and any('passed' in value.key and value.value != '0' for value in status.values)
+            for array in heard
+            for status in array.status
+        )
+
+    soon(told, 'the diagnostics')
 
 
 # A guard that ends, and clocks

@@ -10,11 +10,11 @@ from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from trajectory_guard.entry import Allowance
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.result import NANOSECONDS
 from trajectory_guard.ros.parameters import Declaration
 from trajectory_guard.settings import LARGEST_LENGTH
-from trajectory_guard.takeover import Allowance
 
 DECLARATIONS = {
     'guard': Declaration(

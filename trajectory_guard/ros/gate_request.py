@@ -10,10 +10,11 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from msg_adapters.result import nanoseconds_to_message, result_from_message
 from msg_adapters.trajectory import nanoseconds_from_message
+from trajectory_guard.entry import Entry
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.joint_path import INTERPOLATION
 from trajectory_guard.result import Result, Status, Verdict
-from trajectory_guard.takeover import Entry, Takeover
+from trajectory_guard.takeover import Takeover
 
 # Sums of two tolerances are rounded; what is asked for must not be less.
 _UP = 1.0 + 2.0**-50
@@ -61,13 +62,17 @@ def _points(message: JointTrajectory, plan: Takeover) -> list[JointTrajectoryPoi
 
 
 def _start_state(plan: Takeover) -> JointState:
-    """Return where the joints are, but where the controller begins in the middle of the path."""
-    names = [
-        name
-        for name in plan.measured
-        if plan.entry is not Entry.MIDDLE or name not in plan.trajectory.joint_names
-    ]
-    return JointState(name=names, position=[plan.measured[name].position for name in names])
+    """
+    Return where the joints are at the begin of the path.
+
+    Where the controller begins in the middle, the path's own joints are at its first point then.
+    The state is never empty, so the guard takes none of its own that nobody has checked.
+    """
+    positions = {name: joint.position for name, joint in plan.measured.items()}
+    if plan.entry is Entry.MIDDLE:
+        first = plan.trajectory.positions[0].tolist()
+        positions |= dict(zip(plan.trajectory.joint_names, first, strict=True))
+    return JointState(name=list(positions), position=list(positions.values()))
 
 
 def refusal(
