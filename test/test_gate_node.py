@@ -430,16 +430,16 @@ def test_status_follows(faked: Bench) -> None:
     assert counts.passed + counts.stops + counts.held == len(faked.decisions)
 
 
-def test_diagnostics(bench: Bench) -> None:
+def test_diagnostics(faked: Bench) -> None:
     heard: list[DiagnosticArray] = []
-    bench.node.create_subscription(DiagnosticArray, '/diagnostics', heard.append, 10)
-    bench.free(FREE)
+    faked.node.create_subscription(DiagnosticArray, '/diagnostics', heard.append, 10)
+    faked.free(FREE)
 
     def told() -> bool:
         return any(
-            status.name == 'cell/gate: gate'
+            status.name == 'fake/gate: gate'
             and status.level == DiagnosticStatus.OK
-            and any('passed' in value.key and value.value != '0' for value in status.values)
+            and any(value.key == 'outcome passed' for value in status.values)
             for array in heard
             for status in array.status
         )

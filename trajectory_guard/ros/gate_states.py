@@ -9,6 +9,9 @@ from trajectory_guard.entry import Measured
 # More names than any robot has, so that a broken publisher cannot fill the memory.
 MOST_JOINTS = 1000
 
+# A joint that nobody has told of for so long does not belong to the robot any more [ns].
+FORGOTTEN_NS = 30 * 1_000_000_000
+
 
 class _Row(NamedTuple):
     """The last state of one joint: position, velocity, its stamp and when it arrived [ns]."""
@@ -69,13 +72,16 @@ class JointStates:
 
     def complaint(self, steady_ns: int, now_ns: int, max_age_ns: int) -> str:
         """
-        Say which joint is known, but not fresh, or that none is known.
+        Say which joint was heard of lately, but is not fresh, or that there is none.
 
         :param steady_ns: as for `fresh`.
         :param now_ns: as for `fresh`.
         :param max_age_ns: as for `fresh`.
         :returns: the sentence; '': all are fresh.
         """
+        for name in [*self._rows]:
+            if steady_ns - self._rows[name].arrived_ns > FORGOTTEN_NS:
+                del self._rows[name]
         if not self._rows:
             return 'no joint state has arrived'
         fresh = self.fresh(steady_ns, now_ns, max_age_ns)
