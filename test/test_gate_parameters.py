@@ -10,6 +10,8 @@ from guard_process import ros_context
 import pytest
 from rclpy.context import Context
 from rclpy.parameter import Parameter
+from trajectory_guard_interfaces.msg import GateDecision
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 import yaml
 
 from trajectory_guard.errors import Reason, RequestError
@@ -165,6 +167,32 @@ def test_tracking_tolerance_goes_by_the_name() -> None:
         each.tracking_tolerance_of(['shoulder', 'knee'])
     assert caught.value.reason is Reason.INVALID_TRACKING_TOLERANCE
     assert configuration(tracking_tolerance=[0.3]).tracking_tolerance_of(['a', 'b']) == (0.3, 0.3)
+
+
+# What is raised
+
+
+def test_what_is_raised_holds_and_ends_nothing(gate: Gate) -> None:
+    def broken() -> None:
+        raise ZeroDivisionError('on the way')
+
+    decided: list[GateDecision] = []
+    for _ in range(2):
+        gate._keeper.consider(JointTrajectory(), broken, str, decided.append)
+    assert [d.decision for d in decided] == [GateDecision.HELD] * 2
+    assert {d.reason_code for d in decided} == {'internal_error'}
+    assert 'on the way' in decided[0].message
+    one = JointTrajectory(joint_names=['a'], points=[JointTrajectoryPoint(positions=[0.0])])
+    trial = gate._keeper.consider(one, broken, str, decided.append)
+    assert decided[-1].reason_code == 'guard_missing'
+    # A step that comes after the decision is not taken.
+    gate._keeper._step(trial, broken)
+    assert len(decided) == 3
+    # What is told of a decision does not change it.
+    gate._keeper.consider(JointTrajectory(), lambda: None, str, lambda _: broken())
+    gate._keeper.consider(JointTrajectory(), lambda: None, str, decided.append)
+    assert decided[-1].reason_code == 'stop'
+    assert decided[-1].number == 5
 
 
 # Codes

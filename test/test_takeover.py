@@ -226,6 +226,30 @@ def test_an_approach_is_covered(degree: int, reads_velocity: bool, stamped: bool
     assert closest > 0.7
 
 
+@pytest.mark.parametrize('v0', [0.0, 1.0])
+def test_each_term_of_the_bound_is_reached(v0: float) -> None:
+    exact = dataclasses.replace(ALLOWANCE, max_drift=0.0, max_velocity_drift=0.0)
+    later_ns = exact.max_wait_ns + exact.max_start_delay_ns
+    message = straight(SECOND, NOW_NS + SECOND)
+    message.points[0].velocities = [1.0 - v0] * 3
+    measured = {name: Measured(0.0, v0, 0) for name in JOINTS}
+    path, tolerance = certified(message, plan_of(message, measured, exact))
+    played = Played(message, NOW_NS + later_ns, dict.fromkeys(JOINTS, (0.0, v0)))
+    (begin_ns, _), (end_ns, _), *_ = played.knots
+    off = [
+        distance(
+            played.at(begin_ns + (end_ns - begin_ns) * k // 300),
+            message,
+            path,
+            int(path.knots_ns[1]) * k // 300,
+        )
+        for k in range(300)
+    ]
+    largest = np.max(off, axis=0)
+    assert (largest <= tolerance + ROUNDING).all()
+    assert (largest >= 0.99 * tolerance).all()
+
+
 @pytest.mark.parametrize('degree', [1, 3, 5])
 def test_what_begins_in_the_middle_is_covered(degree: int) -> None:
     rng = np.random.default_rng(degree)
