@@ -283,6 +283,8 @@ def test_the_robot_moves_meanwhile(
     fake.go.set()
     soon(lambda: len(faked.decisions) > count, 'a decision')
     assert faked.decisions[-1].reason_code == code
+    # The guard has answered all the same.
+    assert faked.decisions[-1].result.verdict == CertificationResult.FREE
 
 
 def test_states_stop_meanwhile(files: Path, ask: Asker, fake: FakeGuard) -> None:

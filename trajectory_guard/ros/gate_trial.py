@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rclpy.task import Future
-from trajectory_guard_interfaces.msg import GateDecision
+from trajectory_guard_interfaces.msg import CertificationResult, GateDecision
 from trajectory_guard_interfaces.srv import CertifyTrajectory
 
 from trajectory_guard.ros.gate_parameters import GateConfiguration
@@ -28,6 +28,7 @@ class Trial:
     :param plan: how the controller takes it over; None: not planned yet.
     :param request: what the guard was asked; None: nothing yet.
     :param future: the answer that is waited for; None: none.
+    :param result: what the guard said; None: nothing yet.
     """
 
     message: Any
@@ -40,6 +41,7 @@ class Trial:
     plan: Takeover | None = None
     request: CertifyTrajectory.Request | None = None
     future: Future | None = None
+    result: CertificationResult | None = None
 
     @property
     def expires_ns(self) -> int:

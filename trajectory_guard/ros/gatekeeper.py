@@ -160,11 +160,11 @@ class Gatekeeper:
 
     def _take_answer(self, trial: Trial, answer: Future) -> None:
         """Pass the trajectory on if it is proved free, and if the proof holds now."""
-        result = answer.result().result
+        trial.result = result = answer.result().result
         assert trial.plan is not None and trial.request is not None
         refused = refusal(trial.request, result)
         if refused is not None:
-            self._hold(trial, *refused, result)
+            self._hold(trial, *refused)
             return
         self._check_surroundings(trial)
         changed = self._guard.changed_since(result)
@@ -176,7 +176,7 @@ class Gatekeeper:
         )
         trial.forward()
         self._trial = None
-        self._decide(trial, GateDecision.PASSED, Reason.PROVED_FREE, '', result)
+        self._decide(trial, GateDecision.PASSED, Reason.PROVED_FREE, '')
 
     # Decisions
 
@@ -209,26 +209,13 @@ class Gatekeeper:
         waited = (time.monotonic_ns() - trial.arrived_ns) / 1e9
         self._hold(trial, Reason.GUARD_SILENT, f'no answer of the guard in {waited:.3f} s')
 
-    def _hold(
-        self,
-        trial: Trial,
-        reason: str,
-        message: str,
-        result: CertificationResult | None = None,
-    ) -> None:
+    def _hold(self, trial: Trial, reason: str, message: str) -> None:
         if self._trial is trial:
             self._trial = None
         self._guard.forget(trial.future)
-        self._decide(trial, GateDecision.HELD, reason, message, result)
+        self._decide(trial, GateDecision.HELD, reason, message)
 
-    def _decide(
-        self,
-        trial: Trial,
-        decision: int,
-        reason: str,
-        message: str,
-        result: CertificationResult | None = None,
-    ) -> None:
+    def _decide(self, trial: Trial, decision: int, reason: str, message: str) -> None:
         self._number += 1
         made = GateDecision(
             decision=decision,
@@ -237,7 +224,7 @@ class Gatekeeper:
             reason_code=str(reason),
             message=message,
             latency=(time.monotonic_ns() - trial.arrived_ns) / 1e9,
-            result=result or CertificationResult(),
+            result=trial.result or CertificationResult(),
         )
         for tell in (self._publish, trial.decided):
             try:
