@@ -35,6 +35,9 @@ from msg_adapters.result import result_from_message
 from trajectory_guard.errors import Reason
 from trajectory_guard.result import Result, Verdict
 
+# What has been published is known by so long after [s].
+SOON = 20.0
+
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 FREE = request(message((0.0, [0.0, 0.0]), (1.0, [0.5, 0.5])))
 LATER = request(message((0.5, [0.0, 0.0]), (1.0, [0.5, 0.5])))
@@ -112,7 +115,7 @@ def eventually(
     value: Callable[[], Any], wanted: Callable[[Any], bool], patience: float = 20.0
 ) -> Any:
     """Return a value as soon as it is as wanted."""
-    end = time.monotonic() + patience
+    end = time.monotonic() + SOON
     while time.monotonic() < end:
         found = value()
         if found is not None and wanted(found):
@@ -395,16 +398,15 @@ def test_live_scene_and_two_of_one_name(ask: Asker, files: Path) -> None:
         with guard_process(files, 'live', *arguments, *parameters(autostart='false')) as second:
             manager.says(lambda said: said.reason_code == Reason.DUPLICATE_NAME)
             assert rejection(ask.result('live', FREE)) == Reason.DUPLICATE_NAME
-            second.stop(signal.SIGKILL)
+            assert second.stop(signal.SIGTERM) == 0
         manager.says(lambda said: said.ready)
         assert ask.result('live', FREE).verdict is Verdict.FREE
 
-        # Killed, there is no answer, and who takes its place need not wait for its ghost.
+        # Killed, there is no answer, and who takes its place need not wait for its ghost to go.
         lost = ask.client('live').call_async(LONG)
         time.sleep(0.3)
         first.stop(signal.SIGKILL)
         assert not lost.done()
-    time.sleep(2.5)
     begin = time.monotonic()
     with guard_process(files, 'live', *arguments) as third:
         again = eventually(
