@@ -141,6 +141,7 @@ def managed(files: Path, ask: Asker) -> Iterator[GuardProcess]:
         robot_description_file='no.urdf',
         scene_files=f'[{files / "scene.urdf"}]',
         max_requests=3,
+        max_pieces=100_000_000,
     )
     with guard_process(files, 'managed', *arguments) as process:
         yield process
@@ -417,19 +418,25 @@ def test_live_scene_and_two_of_one_name(ask: Asker, files: Path) -> None:
         assert not lost.done()
 
 
-def test_stopped_in_the_middle(managed: GuardProcess, ask: Asker, files: Path) -> None:
+def test_stopped_in_the_middle(ask: Asker, files: Path) -> None:
     arguments = parameters(
-        robot_description_file=files / 'arm.urdf', scene_files=f'[{files / "scene.urdf"}]'
+        robot_description_file=files / 'arm.urdf',
+        scene_files=f'[{files / "scene.urdf"}]',
+        max_pieces=100_000_000,
+        max_requests=2,
     )
     with guard_process(files, 'stopped', *arguments) as process:
         ask.wait('stopped', process)
         client = ask.client('stopped')
-        short = client.call_async(request(LONG.trajectory, tolerance=1e-8, deadline=duration(1.0)))
-        long = client.call_async(request(LONG.trajectory, tolerance=1e-8, deadline=duration(30.0)))
-        time.sleep(0.3)
+        short, long = (
+            client.call_async(request(LONG.trajectory, tolerance=1e-8, deadline=duration(seconds)))
+            for seconds in (1.5, 30.0)
+        )
+        eventually(lambda: ask.result('stopped', FREE).reason_code, lambda c: c == Reason.BUSY)
         process.process.send_signal(signal.SIGTERM)
-        time.sleep(0.4)
-        assert rejection(ask.result('stopped', FREE)) == Reason.NOT_READY
+        eventually(
+            lambda: ask.result('stopped', FREE).message, lambda said: 'shutting down' in said
+        )
         begin = time.monotonic()
         assert process.process.wait(PATIENCE) == 0
         assert time.monotonic() - begin < 5.0
