@@ -75,7 +75,9 @@ class Guard(ManagedNode):
         self._model: Model | None = None
         self._joint_states: JointStates | None = None
         self._service: Service | None = None
-        self._failure = RequestError(Reason.NOT_READY, 'another transition is under way')
+        self._failure: TrajectoryGuardError = RequestError(
+            Reason.NOT_READY, 'another transition is under way'
+        )
         self._quiet = False
 
         self._saying = threading.Lock()
