@@ -22,10 +22,12 @@ COLORS = {
 }
 OPAQUE = 1.0
 
-# Diameter of the ball at a place, height of a letter, and how far above a text stands [m].
+# Diameter of the ball at a place, and height of a letter [m].
 PLACE_DIAMETER = 0.02
 LETTER_HEIGHT = 0.04
-TEXT_ABOVE = 0.08
+
+# How far above its place a text stands: most collisions begin and end with a suspect instant [m].
+TEXT_ABOVE = {Status.COLLISION: 0.15, Status.SUSPECT: -0.15}
 
 MILLIMETRES = 1e3
 
@@ -100,7 +102,7 @@ class _Writer:
         text = self._marker(f'{namespace}/text')
         text.type = TEXT_VIEW_FACING
         text.text = _text(moment, left_out)
-        above = at + [0.0, 0.0, TEXT_ABOVE]
+        above = at + [0.0, 0.0, TEXT_ABOVE[row.status]]
         _place(text, _shift(above), (LETTER_HEIGHT,) * 3, (*color[:3], OPAQUE))
 
     def _marker(self, namespace: str, action: int = ADD) -> Any:

@@ -317,6 +317,10 @@ BAD = {
         request(FREE, start_state=JointState(name=[f'j{i}' for i in range(11)])),
         Reason.TOO_LARGE,
     ),
+    'too many positions at the start': (
+        request(FREE, start_state=JointState(name=['elbow'], position=[0.0] * 11)),
+        Reason.TOO_LARGE,
+    ),
     'a stamp': (
         bad(lambda r: setattr(r.trajectory.header, 'stamp', Time(sec=1))),
         Reason.INVALID_PARAMETER,

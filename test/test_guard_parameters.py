@@ -121,6 +121,7 @@ NONSENSE = {
     'read-only': {'autostart': False},
     'no topic': {'scene_topic': 'no topic'},
     'no such introspection': {'introspection': 'all'},
+    'relative root': {'mesh_roots': ['meshes']},
     'too many requests': {'max_requests': 257},
 }
 

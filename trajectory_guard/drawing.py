@@ -13,6 +13,7 @@ from trajectory_guard.robot import Collision, Robot
 MOST_TRIANGLES = 1_000
 
 ONES = (1.0, 1.0, 1.0)
+NO_POINTS = read_only(np.empty((0, 3)))
 
 
 class Drawing(NamedTuple):
@@ -28,7 +29,7 @@ class Drawing(NamedTuple):
     kind: MarkerKind
     T: np.ndarray
     scale: tuple[float, float, float] = ONES
-    points: np.ndarray = np.empty((0, 3))
+    points: np.ndarray = NO_POINTS
 
     def moved(self, T: np.ndarray) -> 'Drawing':
         """Return the drawing after a motion, (4, 4) [m]; its points stay the same array."""

@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from trajectory_guard.body import ConvexBody
-from trajectory_guard.errors import Reason, RobotError, SceneError
+from trajectory_guard.errors import Reason, RobotError
 from trajectory_guard.marker import Marker, MarkerKind
 from trajectory_guard.mesh import mesh_body, MeshFile
 from trajectory_guard.mesh_formats import Triangles
 from trajectory_guard.primitive import Box, Cylinder, Sphere
-from trajectory_guard.resource import places
+from trajectory_guard.resource import MeshLimits
 from trajectory_guard.stretched import ellipsoid, elliptic_cylinder
 
 
@@ -27,7 +27,7 @@ class Solids(NamedTuple):
     content: str = ''
 
 
-def solids_of(marker: Marker, mesh_bytes: int) -> Solids:
+def solids_of(marker: Marker, limits: MeshLimits) -> Solids:
     """
     Return the bodies of a marker.
 
@@ -36,11 +36,11 @@ def solids_of(marker: Marker, mesh_bytes: int) -> Solids:
     of unequal diameters each is the ball of the largest.
 
     :param marker: the marker.
-    :param mesh_bytes: size that a mesh file may have.
-    :raises SceneError: a mesh is missing, too large or unusable, or a coordinate too large.
+    :param limits: which mesh files may be read.
+    :raises SceneError: a mesh is missing, forbidden or unusable, or something is too large.
     """
     try:
-        bodies, content = _shapes(marker, mesh_bytes)
+        bodies, content = _shapes(marker, limits)
         return Solids(tuple(body.moved(marker.T_frame_marker) for body in bodies), content)
     except RobotError as error:
         raise marker.refusal('mesh_resource', marker.mesh, error.reason, f': {error}') from error
@@ -50,12 +50,11 @@ def solids_of(marker: Marker, mesh_bytes: int) -> Solids:
         ) from error
 
 
-def _shapes(marker: Marker, mesh_bytes: int) -> tuple[tuple[ConvexBody, ...], str]:
+def _shapes(marker: Marker, limits: MeshLimits) -> tuple[tuple[ConvexBody, ...], str]:
     """Return the bodies in the marker's own frame, and the hash of their file."""
     match marker.kind:
         case MarkerKind.MESH_RESOURCE:
-            _check_size(marker, mesh_bytes)
-            loaded = MeshFile(marker.mesh, None, marker.scale).load()
+            loaded = MeshFile(marker.mesh, None, marker.scale, limits).load()
             return (loaded.body,), loaded.content
         case MarkerKind.TRIANGLE_LIST:
             corners = np.arange(len(marker.points)).reshape(-1, 3)
@@ -90,16 +89,3 @@ def _shift(point: np.ndarray) -> np.ndarray:
     T = np.eye(4)
     T[:3, 3] = point
     return T
-
-
-def _check_size(marker: Marker, mesh_bytes: int) -> None:
-    for path in places(marker.mesh, None):
-        if path.is_file():
-            size = path.stat().st_size
-            if size > mesh_bytes:
-                raise SceneError(
-                    Reason.TOO_LARGE,
-                    f'marker {marker.key.name!r}: mesh_resource {marker.mesh!r} has {size} bytes, '
-                    f'more than {mesh_bytes}',
-                )
-            return

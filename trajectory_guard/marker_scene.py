@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 import hashlib
+from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from trajectory_guard.errors import Reason, SceneError
 from trajectory_guard.marker import Key, Marker, Removal
 from trajectory_guard.marker_bodies import Solids, solids_of
+from trajectory_guard.resource import MeshLimits
 from trajectory_guard.robot import JointType, Robot
 from trajectory_guard.scene import Obstacle, Scene
 
@@ -24,11 +26,18 @@ class MarkerLimits(NamedTuple):
     :param markers: in one array, removals included, and in the scene.
     :param points: of all lists of the scene together.
     :param mesh_bytes: of one mesh file.
+    :param mesh_roots: folders that mesh files lie in, links resolved; empty: anywhere.
     """
 
     markers: int = 1_000
-    points: int = 100_000
+    points: int = 10_000
     mesh_bytes: int = 64 * 1024 * 1024
+    mesh_roots: tuple[Path, ...] = ()
+
+    @property
+    def meshes(self) -> MeshLimits:
+        """Which mesh files may be read."""
+        return MeshLimits(self.mesh_roots, self.mesh_bytes)
 
 
 class _Entry(NamedTuple):
@@ -86,7 +95,7 @@ class MarkerScene:
         old, digest = self.entries.get(marker.key), marker.digest()
         if old is not None and old.digest == digest:
             return old
-        return _Entry(marker, digest, solids_of(marker, limits.mesh_bytes))
+        return _Entry(marker, digest, solids_of(marker, limits.meshes))
 
     def obstacles(self, frames: Frames) -> tuple[Obstacle, ...]:
         """

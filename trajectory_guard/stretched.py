@@ -10,7 +10,7 @@ from trajectory_guard.primitive import INWARD, PRISM_SIDES, sphere_directions
 
 def ellipsoid(diameters: tuple[float, float, float]) -> ConvexBody:
     """
-    Return a polyhedron that contains an ellipsoid, 1.7 % larger, and a polytope inside it.
+    Return a polyhedron that contains an ellipsoid, 1.8 % larger at most, and a polytope inside it.
 
     The convex hull of the directions p_i contains the ball of radius r, so that of the p_i / r
     contains the unit ball; scaled by the half axes D it contains the ellipsoid D B. Rounding moves
@@ -28,7 +28,7 @@ def ellipsoid(diameters: tuple[float, float, float]) -> ConvexBody:
 
 def elliptic_cylinder(diameters: tuple[float, float], length: float) -> ConvexBody:
     """
-    Return a prism that contains an elliptic cylinder about z, 0.9 % larger, and one inside it.
+    Return a prism round an elliptic cylinder about z, 0.9 % wider at most, and one inside it.
 
     A regular polygon of n corners at the distance 1 / cos(pi / n) contains the unit circle, and
     one whose sides have the distance cos(pi / n) lies in it; both are scaled by the half axes.

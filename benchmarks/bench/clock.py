@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 import contextlib
 import gc
+import statistics
 import time
 from typing import Any
 
@@ -54,3 +55,17 @@ def best_ms(call: Callable[[], Any], runs: int = RUNS) -> tuple[float, Any]:
 def percentile(values: list[float], share: float) -> float:
     """Return the value below which a share of the values lies."""
     return sorted(values)[min(len(values) - 1, int(share * len(values)))]
+
+
+def quantiles(ms: list[float], what: str = '') -> dict[str, float]:
+    """
+    Return columns with the median and the upper percentiles of times.
+
+    :param ms: times [ms].
+    :param what: what the names of the columns begin with.
+    """
+    return {
+        f'{what}median_ms': statistics.median(ms),
+        f'{what}p90_ms': percentile(ms, 0.9),
+        f'{what}p99_ms': percentile(ms, 0.99),
+    }

@@ -38,6 +38,10 @@ TITLES = {
     'pair': 'Two boxes with 12 edges each; degree: of the constraints',
     'two movers': 'Two movers against one (paper: less than an order of magnitude)',
     'exact': 'Two boxes in exact arithmetic',
+    'round trip': 'One client; above: without the time of the answer itself; echo: does nothing',
+    'clients': 'Clients in processes of their own, and what the guard keeps of their requests',
+    'start': 'From the start of a process to its first answer, kernels compiled before',
+    'gate': 'From publishing a trajectory to its arrival at the controller',
     'growth of bodies': 'Two bodies of more and more vertices; order: of cost in constraints',
 }
 

@@ -131,11 +131,11 @@ class Configuration:
             max_state_age=values['max_state_age'],
             max_requests=values['max_requests'] or 2 * (os.cpu_count() or 1),
             marker_limits=MarkerLimits(
-                markers=values['max_markers'], mesh_bytes=values['max_mesh_bytes']
+                markers=values['max_markers'],
+                mesh_bytes=values['max_mesh_bytes'],
+                mesh_roots=_folders(values['mesh_roots']),
             ),
-            mesh_limits=MeshLimits(
-                tuple(map(Path, _named(values['mesh_roots']))), values['max_mesh_bytes']
-            ),
+            mesh_limits=MeshLimits(_folders(values['mesh_roots']), values['max_mesh_bytes']),
             introspection=_introspection(values['introspection']),
         )
 
@@ -164,6 +164,17 @@ class Configuration:
                     f'but {", ".join(named)}',
                 )
         return tuple(named[name] for name in joint_names)
+
+
+def _folders(names: Sequence[str] | None) -> tuple[Path, ...]:
+    """Return folders that do not depend on where the process is."""
+    folders = tuple(map(Path, _named(names)))
+    for folder in folders:
+        if not folder.is_absolute():
+            raise RequestError(
+                Reason.INVALID_PARAMETER, f'mesh_roots must be absolute paths, got {str(folder)!r}'
+            )
+    return folders
 
 
 def _introspection(name: str) -> ServiceIntrospectionState:

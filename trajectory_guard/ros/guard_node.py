@@ -31,22 +31,20 @@ from trajectory_guard.ros.configuration import Configuration
 from trajectory_guard.ros.health import Health
 from trajectory_guard.ros.joint_states import JointStates
 from trajectory_guard.ros.managed import ManagedNode
-from trajectory_guard.ros.model import Model
+from trajectory_guard.ros.model import LATCHED, Model
 from trajectory_guard.ros.moments import MomentsPublisher
-from trajectory_guard.ros.namesakes import Namesakes, STATUS, TOPIC
+from trajectory_guard.ros.namesakes import Namesakes
 from trajectory_guard.ros.parameters import DECLARATIONS, declare, values
 from trajectory_guard.ros.question import measured_start, Question, question_from_request
 from trajectory_guard.warm import warm_up
 from trajectory_guard.workcell import Workcell
 
 NAME = 'guard'
+STATUS = '~/status'
 
 # Requests that arrive faster than they are taken wait here; the middleware drops older ones.
 REQUESTS = QoSProfile(depth=4096)
 EVENTS = QoSProfile(depth=1000)
-
-# Others of the same name are known by so long after the node was made [s].
-DISCOVERY = 1.0
 
 # How often it is looked whether the scene has got old, or somebody else has gone [s].
 WATCH = 0.2
@@ -65,7 +63,6 @@ class Guard(ManagedNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(NAME, **options)
-        self._made = time.monotonic()
         try:
             self._values = declare(self)
             self._configuration = self._checked(self._values)
@@ -78,20 +75,22 @@ class Guard(ManagedNode):
         self._model: Model | None = None
         self._joint_states: JointStates | None = None
         self._service: Service | None = None
-        self._failure = RequestError(Reason.NOT_READY, 'another transition is under way')
+        self._failure: TrajectoryGuardError = RequestError(
+            Reason.NOT_READY, 'another transition is under way'
+        )
         self._quiet = False
 
         self._saying = threading.Lock()
         self._said = GuardStatus()
-        self._publisher = self.create_publisher(GuardStatus, TOPIC, STATUS)
+        self._publisher = self.create_publisher(GuardStatus, STATUS, LATCHED)
         self._health = Health(self, 'certify', self._health_state)
         self._moments = MomentsPublisher(self)
         self._judged: tuple[Result, Workcell, Question] | None = None
         self._to_show = self.create_guard_condition(self._show, MutuallyExclusiveCallbackGroup())
-        self._namesakes = Namesakes(self, self._say_state)
+        self._namesakes = Namesakes(self, STATUS)
         self.create_timer(
             WATCH,
-            self._say_state,
+            self._watch,
             callback_group=MutuallyExclusiveCallbackGroup(),
             clock=Clock(clock_type=ClockType.STEADY_TIME),
         )
@@ -156,9 +155,7 @@ class Guard(ManagedNode):
         self._model = Model(self, configuration, self._say_state)
         self.get_logger().info('warming up (the first start compiles the kernels)')
         warm_up(configuration.settings.cover)
-        while not self._namesakes.any and time.monotonic() < self._made + DISCOVERY:
-            time.sleep(DISCOVERY / 20)
-        if self._namesakes.any:
+        if self._namesakes.wait():
             raise RequestError(
                 Reason.DUPLICATE_NAME,
                 f'there is another node {self.get_fully_qualified_name()}: stop it, or give this '
@@ -257,6 +254,10 @@ class Guard(ManagedNode):
         status.ready = True
         status.robot_hash, status.scene_hash = workcell.robot_hash, workcell.scene_hash
         return status, workcell
+
+    def _watch(self) -> None:
+        self._namesakes.look()
+        self._say_state()
 
     def _say_state(self) -> None:
         """Say whether the guard is ready, and for what, if that has changed."""

@@ -20,9 +20,13 @@ from collections.abc import Callable
 import time
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo, SubscriptionEventCallbacks
+from rclpy.event_handler import (
+    QoSMessageLostInfo,
+    QoSRequestedIncompatibleQoSInfo,
+    SubscriptionEventCallbacks,
+)
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.marker import added_keys, changes_from_message
@@ -30,9 +34,10 @@ from trajectory_guard.errors import Reason, SceneError, TrajectoryGuardError
 from trajectory_guard.live_markers import LiveMarkers
 from trajectory_guard.marker_scene import Frames, MarkerLimits
 
-# What was published before the node came, and nothing lost.
+# What was published before the node came too, and nothing is lost: of a bounded queue, arrays that
+# come faster than they are taken would fall out silently, and an obstacle with them.
 MARKERS = QoSProfile(
-    depth=10,
+    history=HistoryPolicy.KEEP_ALL,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
     reliability=ReliabilityPolicy.RELIABLE,
 )
@@ -43,7 +48,9 @@ class LiveScene:
     The markers of one topic.
 
     A publisher that is not transient local and reliable is never heard; since its markers may be
-    on show, that is an error, which only an array that begins by removing everything ends.
+    on show, that is an error, and so is an array that the middleware lost. Only an array that
+    begins by removing everything ends them. What a publisher itself has not kept for those who
+    come later, as its depth says, nobody can know of.
 
     :param node: gets the subscription.
     :param topic: visualization_msgs/MarkerArray, reliable and transient local.
@@ -74,7 +81,9 @@ class LiveScene:
             self._take,
             MARKERS,
             callback_group=MutuallyExclusiveCallbackGroup(),
-            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._unheard),
+            event_callbacks=SubscriptionEventCallbacks(
+                incompatible_qos=self._unheard, message_lost=self._lost
+            ),
         )
 
     @property
@@ -113,11 +122,16 @@ class LiveScene:
             return self._state.refused(internal)
 
     def _unheard(self, event: QoSRequestedIncompatibleQoSInfo) -> None:
-        error = SceneError(
-            Reason.SCENE_INVALID,
-            f'markers on {self.topic}: {event.total_count} publishers offer another quality of '
-            f'service ({event.last_policy_kind!r}) than reliable and transient local, and are not '
-            'heard',
+        self._incomplete(
+            f'{event.total_count} publishers offer another quality of service '
+            f'({event.last_policy_kind!r}) than reliable and transient local, and are not heard'
         )
+
+    def _lost(self, event: QoSMessageLostInfo) -> None:
+        self._incomplete(f'{event.total_count} arrays were lost on the way')
+
+    def _incomplete(self, words: str) -> None:
+        """Remember that something may be shown of which nothing is known."""
+        error = SceneError(Reason.SCENE_INVALID, f'markers on {self.topic}: {words}')
         self._state = self._state.refused(error)
         self._on_change()

@@ -1,63 +1,47 @@
 """Other guards of the same name, of which a client cannot tell whom it asks."""
 
-from collections.abc import Callable
+import time
 
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.duration import Duration
-from rclpy.event_handler import QoSLivelinessChangedInfo, SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
-from trajectory_guard_interfaces.msg import GuardStatus
 
-TOPIC = '~/status'
-
-# A process that was killed stays in the graph for 20 s or so, and the guard that takes its place
-# must not wait for that: whoever publishes a status is asserted alive by the middleware, and is
-# not any more after this time [s].
-LEASE = 2.0
-
-STATUS = QoSProfile(
-    depth=1,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-    liveliness=LivelinessPolicy.AUTOMATIC,
-    liveliness_lease_duration=Duration(seconds=LEASE),
-)
+# Who else is there is known so long after a node was made [s].
+DISCOVERY = 1.5
 
 
 class Namesakes:
     """
-    Watches for other nodes of the node's full name whose status is alive.
+    Looks for other nodes of the node's full name.
 
-    :param node: publishes its own status on `TOPIC` with the quality of service `STATUS`.
-    :param on_change: called in the node's executor whenever one comes or goes.
+    One that ends is gone at once; one that is killed stays in the graph for as long as its
+    middleware granted it (20 s for Fast DDS), but only for those who knew it: whoever takes its
+    place never hears of it.
+
+    :param node: whose namesakes they are.
+    :param topic: that every node of that name publishes, known earlier than its name.
     """
 
-    def __init__(self, node: Node, on_change: Callable[[], None]) -> None:
+    def __init__(self, node: Node, topic: str) -> None:
         self._node = node
-        self._on_change = on_change
-        self._alive = 0
-        node.create_subscription(
-            GuardStatus,
-            TOPIC,
-            lambda _: None,
-            STATUS,
-            callback_group=MutuallyExclusiveCallbackGroup(),
-            event_callbacks=SubscriptionEventCallbacks(liveliness=self._changed),
-        )
+        self._topic = node.resolve_topic_name(topic)
+        self._made = time.monotonic()
+        self._any = False
 
     @property
     def any(self) -> bool:
-        """
-        Whether there is one.
+        """Whether there was one when it was looked last."""
+        return self._any
 
-        Some middlewares count the node's own status among those alive, Fast DDS does not; so the
-        name must be in the graph twice, too.
-        """
-        if not self._alive:
-            return False
+    def look(self) -> bool:
+        """Look again, and return whether there is one."""
         mine = (self._node.get_name(), self._node.get_namespace())
-        return self._node.get_node_names_and_namespaces().count(mine) > 1
+        self._any = (
+            self._node.count_publishers(self._topic) > 1
+            or self._node.get_node_names_and_namespaces().count(mine) > 1
+        )
+        return self._any
 
-    def _changed(self, event: QoSLivelinessChangedInfo) -> None:
-        self._alive = event.alive_count
-        self._on_change()
+    def wait(self) -> bool:
+        """Look until all are known, and return whether there is one."""
+        while not self.look() and time.monotonic() < self._made + DISCOVERY:
+            time.sleep(DISCOVERY / 20)
+        return self._any

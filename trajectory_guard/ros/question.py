@@ -104,6 +104,8 @@ def _check_sizes(request: Any, configuration: Configuration) -> None:
         ('points', request.trajectory.points, 'max_points'),
         ('joint_names', request.trajectory.joint_names, 'max_joints'),
         ('names in start_state', request.start_state.name, 'max_joints'),
+        ('positions in start_state', request.start_state.position, 'max_joints'),
+        ('velocities in start_state', request.start_state.velocity, 'max_joints'),
         ('values in tracking_tolerance', request.tracking_tolerance, 'max_joints'),
     ):
         most = getattr(configuration, limit)
