@@ -9,6 +9,7 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from trajectory_guard_interfaces.srv import CertifyTrajectory
 
 from bench.cases import Case
@@ -18,6 +19,10 @@ from trajectory_guard.result import Verdict
 # A request without an answer by then is lost [s].
 PATIENCE = 20.0
 PATIENCE_AT_FIRST = 0.2
+
+# DDS brings every client the answers to all, and each leaves out the others' only when it takes
+# them: with the usual 10 places, those push one's own out while this process waits for a core.
+ANSWERS = QoSProfile(depth=1000)
 
 
 class Answer(NamedTuple):
@@ -68,7 +73,9 @@ class Client:
 
     def __init__(self, node: Node, executor: SingleThreadedExecutor, server: str) -> None:
         self._executor = executor
-        self._client = node.create_client(CertifyTrajectory, f'/{server}/certify')
+        self._client = node.create_client(
+            CertifyTrajectory, f'/{server}/certify', qos_profile=ANSWERS
+        )
 
     def connect(self, request: CertifyTrajectory.Request) -> None:
         """
