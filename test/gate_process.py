@@ -37,7 +37,6 @@ from trajectory_guard_interfaces.srv import CertifyTrajectory
 from trajectory_msgs.msg import JointTrajectory
 
 from trajectory_guard.joint_path import INTERPOLATION
-from trajectory_guard.ros.namesakes import STATUS
 
 GATE = EXECUTABLE.with_name('gate')
 
@@ -109,7 +108,7 @@ class FakeGuard:
             self._answer,
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
-        self._status = self.node.create_publisher(GuardStatus, '~/status', STATUS)
+        self._status = self.node.create_publisher(GuardStatus, '~/status', LATCHED)
         self.say(ready=True)
 
     def say(self, ready: bool, scene_hash: str = 's') -> None:

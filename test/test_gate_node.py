@@ -51,6 +51,8 @@ HIT = message((0.0, [0.0, 0.0]), (1.0, [1.9, 0.0]))
 APPROACHED = message((1.0, [0.2, 0.2]), (2.0, [0.5, 0.5]))
 STOP = JointTrajectory()
 
+CONFIG = Path(__file__).parent.parent / 'config'
+
 # The robot of the tests is late on a busy machine.
 PATIENT = {'max_state_age': 0.4, 'max_drift': 0.01}
 
@@ -452,7 +454,10 @@ def test_diagnostics(faked: Bench) -> None:
 # A guard that ends, and clocks
 
 
-def test_a_guard_that_is_killed_meanwhile(files: Path, ask: Asker, workcell: list[str]) -> None:
+def test_a_guard_that_is_killed_meanwhile(
+    monkeypatch: pytest.MonkeyPatch, files: Path, ask: Asker, workcell: list[str]
+) -> None:
+    monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', str(CONFIG / 'fastdds.xml'))
     with gate_process(files, 'mortal', *parameters(deadline=0.3, **PATIENT)) as gate:
         made = Bench(ask.node, 'mortal')
         made.wait(gate, 'guard_missing')
@@ -469,12 +474,9 @@ def test_a_guard_that_is_killed_meanwhile(files: Path, ask: Asker, workcell: lis
             assert made.decisions[-1].reason_code == 'guard_silent'
         assert made.code(STOP) == 'stop'
         soon(lambda: made.statuses[-1].reason_code == 'guard_missing', 'the status')
-        # The dead one stays in the graph for longer than the new one needs.
-        begin = time.monotonic()
         with guard_process(files, 'mortal', *workcell):
             soon(lambda: made.statuses[-1].ready, 'the guard', PATIENCE)
             made.free(FREE)
-            assert time.monotonic() - begin < 15.0
         assert_in_order(made)
         assert gate.stop(signal.SIGINT) == 0
 

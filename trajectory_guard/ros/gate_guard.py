@@ -5,14 +5,13 @@ from typing import Any
 
 from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
-from rclpy.event_handler import QoSLivelinessChangedInfo, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.task import Future
 from trajectory_guard_interfaces.msg import CertificationResult, GuardStatus
 from trajectory_guard_interfaces.srv import CertifyTrajectory
 
 from trajectory_guard.errors import Reason, RequestError
-from trajectory_guard.ros.namesakes import STATUS
+from trajectory_guard.ros.model import LATCHED
 
 _LEAST = ('tracking_tolerance', 'tracking_tolerance_joints')
 
@@ -32,24 +31,20 @@ class GuardClient:
         self._certify = node.create_client(CertifyTrajectory, f'{guard}/certify')
         self._parameters = node.create_client(GetParameters, f'{guard}/get_parameters')
         self._status: GuardStatus | None = None
-        self._alive = self._dead = 0
         self._changed = changed
-        node.create_subscription(
-            GuardStatus,
-            f'{guard}/status',
-            self._take,
-            STATUS,
-            event_callbacks=SubscriptionEventCallbacks(liveliness=self._count),
-        )
+        node.create_subscription(GuardStatus, f'{guard}/status', self._take, LATCHED)
 
     def missing(self) -> RequestError | None:
         """Return why the guard cannot be asked now, or would refuse; None: it can."""
-        servers = self._servers()
+        servers = self._node.count_services(self._service)
         if servers > 1:
             return RequestError(
                 Reason.GUARD_AMBIGUOUS,
                 f'{servers} nodes offer {self._service}: which of them is right?',
             )
+        if servers == 0:
+            # What it said holds for nobody.
+            self._status = None
         if servers == 0 or not self._certify.service_is_ready():
             return RequestError(Reason.GUARD_MISSING, f'no node offers {self._service}')
         if not self._parameters.service_is_ready():
@@ -64,16 +59,6 @@ class GuardClient:
                 f'the guard says {self._status.reason_code}: {self._status.message}',
             )
         return None
-
-    def _servers(self) -> int:
-        """
-        Return how many living nodes offer the service.
-
-        One that was killed stays in the graph for 20 s or so, but the middleware knows sooner that
-        who publishes its status is dead. Only as many as are not among the living are taken off.
-        """
-        servers: int = self._node.count_services(self._service)
-        return servers - min(self._dead, max(servers - self._alive, 0))
 
     def changed_since(self, result: CertificationResult) -> RequestError | None:
         """Return what is not as it was for a result; None: all is."""
@@ -100,13 +85,6 @@ class GuardClient:
         for client in (self._certify, self._parameters):
             if future is not None:
                 client.remove_pending_request(future)
-
-    def _count(self, event: QoSLivelinessChangedInfo) -> None:
-        self._alive, self._dead = event.alive_count, event.not_alive_count
-        if not self._alive:
-            # What the dead have said holds for nobody.
-            self._status = None
-        self._changed()
 
     def _take(self, status: GuardStatus) -> None:
         self._status = status
