@@ -54,7 +54,8 @@ FREE = message((0.0, [0.0, 0.0, 0.1]), (1.0, [0.5, 0.5, 0.1]), joints=[*RANGES])
 HIT = message((0.0, [1.2, 0.0, 0.1]), (1.0, [1.9, 0.0, 0.1]), joints=[*RANGES])
 
 FEW, MANY = 3000, 100_000
-SENT, BATCH = 2000, 50
+# Few at once: a guard may refuse more than it has hands for.
+SENT, BATCH = 2000, 2
 TIME_LIMIT = 90.0  # s
 SAMPLES = 48
 
