@@ -28,6 +28,7 @@ from hostile_requests import hostile, RANGES, span_ns, URDF
 import numpy as np
 import pytest
 from scipy.interpolate import BPoly
+from sensor_msgs.msg import JointState
 from sweep import Sweep
 from trajectory_guard_interfaces.srv import CertifyTrajectory
 
@@ -200,6 +201,14 @@ def hostile_requests(seed: int, count: int, **options: bool) -> Iterator[Any]:
         yield hostile(rng, **options)
 
 
+@pytest.mark.filterwarnings('error')
+def test_overflow_is_refused_in_silence(workcell: Workcell) -> None:
+    huge = message((0.0, [0.0]), (1.0, [1.2e308]), (2.0, [-0.4e308]), joints=['elbow'])
+    state = JointState(name=[*RANGES], position=[0.0, 0.0, 0.1])
+    result = answered(workcell, CertifyTrajectory.Request(trajectory=huge, start_state=state))
+    assert result.reason_code == Reason.TOO_LARGE
+
+
 def fuzzed(workcell: Workcell, seed: int, count: int) -> Counter[str]:
     """Judge many requests, and return how often each verdict and each reason was given."""
     sweep, rng = Sweep(workcell), np.random.default_rng(seed)
@@ -231,6 +240,7 @@ def test_the_other_judge_objects(workcell: Workcell) -> None:
         check_free(sweep, CertifyTrajectory.Request(trajectory=HIT), free, rng)
 
 
+@pytest.mark.filterwarnings('error::RuntimeWarning')
 def test_hostile_requests_are_judged_or_refused(workcell: Workcell) -> None:
     seen = fuzzed(workcell, seed=1, count=FEW)
     for verdict in Verdict:
@@ -239,6 +249,7 @@ def test_hostile_requests_are_judged_or_refused(workcell: Workcell) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings('error::RuntimeWarning')
 def test_many_hostile_requests(workcell: Workcell) -> None:
     seen = fuzzed(workcell, seed=2, count=MANY)
     assert seen['FREE'] >= 1000, seen
