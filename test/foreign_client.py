@@ -1,28 +1,34 @@
 """
-A client of the guard that shares nothing with it: another vendor's DDS, types written by hand.
+A client of the guard that shares nothing with it: another vendor's DDS, hand-written types.
 
 A program. It plays the robot's description to the guard's topic, then answers each line of JSON on
 its input by one on its output: {"points": ...} by what the guard says to that trajectory,
 {"garbage": [...]} by how many payloads it sent to the guard in place of requests.
 """
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 import json
 import sys
 import time
 
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.annotations import final
-from cyclonedds.idl.types import float64, int32, sequence, uint8, uint32
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
+from foreign_types import (
+    CertificationResult,
+    Duration,
+    Garbage,
+    JointTrajectory,
+    JointTrajectoryPoint,
+    Request,
+    Response,
+    String,
+)
 
 PATIENCE = 60.0  # s
-REQUEST = 'trajectory_guard_interfaces.srv.dds_.CertifyTrajectory_Request_'
 
 # This machine only.
 NETWORK = """
@@ -39,137 +45,6 @@ NETWORK = """
   </Domain>
 </CycloneDDS>
 """
-
-
-@dataclass
-@final
-class String(IdlStruct, typename='std_msgs.msg.dds_.String_'):
-    data: str
-
-
-@dataclass
-@final
-class Time(IdlStruct, typename='builtin_interfaces.msg.dds_.Time_'):
-    sec: int32 = 0
-    nanosec: uint32 = 0
-
-
-@dataclass
-@final
-class Duration(IdlStruct, typename='builtin_interfaces.msg.dds_.Duration_'):
-    sec: int32 = 0
-    nanosec: uint32 = 0
-
-
-@dataclass
-@final
-class Header(IdlStruct, typename='std_msgs.msg.dds_.Header_'):
-    stamp: Time = field(default_factory=Time)
-    frame_id: str = ''
-
-
-@dataclass
-@final
-class JointTrajectoryPoint(IdlStruct, typename='trajectory_msgs.msg.dds_.JointTrajectoryPoint_'):
-    positions: sequence[float64] = ()
-    velocities: sequence[float64] = ()
-    accelerations: sequence[float64] = ()
-    effort: sequence[float64] = ()
-    time_from_start: Duration = field(default_factory=Duration)
-
-
-@dataclass
-@final
-class JointTrajectory(IdlStruct, typename='trajectory_msgs.msg.dds_.JointTrajectory_'):
-    header: Header = field(default_factory=Header)
-    joint_names: sequence[str] = ()
-    points: sequence[JointTrajectoryPoint] = ()
-
-
-@dataclass
-@final
-class JointState(IdlStruct, typename='sensor_msgs.msg.dds_.JointState_'):
-    header: Header = field(default_factory=Header)
-    name: sequence[str] = ()
-    position: sequence[float64] = ()
-    velocity: sequence[float64] = ()
-    effort: sequence[float64] = ()
-
-
-@dataclass
-@final
-class Request(IdlStruct, typename=REQUEST):
-    trajectory: JointTrajectory = field(default_factory=JointTrajectory)
-    start_state: JointState = field(default_factory=JointState)
-    tolerance: float64 = 0.0
-    clearance: float64 = 0.0
-    tracking_tolerance: sequence[float64] = ()
-    deadline: Duration = field(default_factory=Duration)
-    scope: uint8 = 0
-    refine: uint8 = 0
-    want_certificate: bool = False
-
-
-@dataclass
-@final
-class Garbage(IdlStruct, typename=REQUEST):
-    """Claims to be a request; its bytes are read as one, the count as the seconds of its stamp."""
-
-    body: sequence[uint8]
-
-
-@dataclass
-@final
-class Point(IdlStruct, typename='geometry_msgs.msg.dds_.Point_'):
-    x: float64
-    y: float64
-    z: float64
-
-
-@dataclass
-@final
-class TimeInterval(IdlStruct, typename='trajectory_guard_interfaces.msg.dds_.TimeInterval_'):
-    status: uint8
-    reason: str
-    start: Duration
-    end: Duration
-    body: str
-    obstacle: str
-    at: Duration
-    location: Point
-    gap_lower: float64
-    gap_upper: float64
-
-
-@dataclass
-@final
-class CertificationResult(
-    IdlStruct, typename='trajectory_guard_interfaces.msg.dds_.CertificationResult_'
-):
-    verdict: uint8
-    reason_code: str
-    message: str
-    intervals: sequence[TimeInterval]
-    tolerance: float64
-    clearance: float64
-    interpolation: str
-    robot_hash: str
-    scene_hash: str
-    compute_time: float64
-    pieces: uint32
-    pairs_checked: uint32
-    unchecked_pairs: sequence[str]
-    warnings: sequence[str]
-    duration: Duration
-
-
-@dataclass
-@final
-class Response(
-    IdlStruct, typename='trajectory_guard_interfaces.srv.dds_.CertifyTrajectory_Response_'
-):
-    result: CertificationResult
-    certificate: str
 
 
 # ROS 2 writes version 1 of the encoding. Every garbage is to arrive, as fast as it is taken.
