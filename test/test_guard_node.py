@@ -43,7 +43,8 @@ from trajectory_guard.certify import judge
 from trajectory_guard.demo.files import panda_urdf
 from trajectory_guard.errors import Reason
 from trajectory_guard.result import Result, Verdict
-from trajectory_guard.ros.guard import Guard, main
+from trajectory_guard.ros.guard import main
+from trajectory_guard.ros.guard_node import Guard
 from trajectory_guard.scene import load_scene
 from trajectory_guard.settings import Settings
 from trajectory_guard.urdf import load_robot
@@ -106,6 +107,7 @@ def guard(files: Path, ask: Asker) -> Iterator[GuardProcess]:
         tracking_tolerance=list(MINIMUM.tracking_tolerance),
         max_points=1000,
         max_joints=10,
+        max_requests=64,
         deadline=60.0,
     )
     with guard_process(files, 'arm', *arguments) as process:
@@ -476,10 +478,12 @@ def test_robot_from_topic(files: Path, ask: Asker) -> None:
     scene = Parameter('scene_files', value=[str(files / 'scene.urdf')])
     publish['early'](String(data=ARM))
     with ros_context() as context:
-        executor = MultiThreadedExecutor(4, context=context)
+        executor = MultiThreadedExecutor(8, context=context)
         for name in publish:
             options = {'context': context, 'namespace': name, 'cli_args': ['--ros-args']}
-            executor.add_node(Guard(parameter_overrides=[scene], **options))
+            guard = Guard(parameter_overrides=[scene], **options)
+            executor.add_node(guard)
+            executor.create_task(guard.start)
         with spinning(executor):
             # A robot published before the node was there.
             robot = load_robot(files / 'arm.urdf')

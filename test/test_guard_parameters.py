@@ -16,7 +16,7 @@ import yaml
 
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.ros.configuration import Configuration
-from trajectory_guard.ros.guard import Guard
+from trajectory_guard.ros.guard_node import Guard
 from trajectory_guard.ros.parameters import DECLARATIONS
 from trajectory_guard.ros.question import question_from_request
 from trajectory_guard.settings import Settings
@@ -57,7 +57,9 @@ def test_file_explains_it(name: str) -> None:
     block = re.search(rf'((?:^    #.*\n)+)    {name}:', CONFIG.read_text(), re.MULTILINE)
     assert block, 'no comment'
     declaration = DECLARATIONS[name]
-    assert declaration.read_only == ('at\n    # start)' in block[1] or '(at start)' in block[1])
+    said = ' '.join(block[1].replace('#', ' ').split())
+    assert declaration.read_only == ('(at start)' in said)
+    assert declaration.at_configure == ('(at configure)' in said)
     for unit in re.findall(r'\[[^]]*\brad\b|\[m\b|\[s\b', declaration.description):
         assert unit in block[1]
     if declaration.bounds:
@@ -91,6 +93,7 @@ def test_descriptor(guard: Guard, name: str) -> None:
         ranges
     )
     assert bool(ranges) == (type(DEFAULTS[name]) in (int, float))
+    assert bool(descriptor.additional_constraints) == DECLARATIONS[name].at_configure
 
 
 # What is refused
@@ -115,8 +118,10 @@ NONSENSE = {
     'wrong type': {'check_joint_limits': 'yes'},
     'no float': {'clearance': 1},
     'good and bad': {'clearance': 0.1, 'tolerance': -1.0},
-    'read-only file': {'robot_description_file': 'other.urdf'},
-    'read-only pose': {'scene_pose': [0.0] * 6},
+    'read-only': {'autostart': False},
+    'no topic': {'scene_topic': 'no topic'},
+    'no such introspection': {'introspection': 'all'},
+    'too many requests': {'max_requests': 257},
 }
 
 

@@ -42,11 +42,13 @@ class Reason(str, Enum):
     GEOMETRY_UNSUPPORTED = 'geometry_unsupported'
     MESH_MISSING = 'mesh_missing'
     MESH_INVALID = 'mesh_invalid'
+    MESH_FORBIDDEN = 'mesh_forbidden'
 
     # The scene.
     SCENE_INVALID = 'scene_invalid'
     SCENE_EMPTY = 'scene_empty'
     SCENE_MISSING = 'scene_missing'
+    SCENE_STALE = 'scene_stale'
     FRAME_UNKNOWN = 'frame_unknown'
     DUPLICATE_NAME = 'duplicate_name'
 

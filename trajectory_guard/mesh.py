@@ -9,7 +9,7 @@ import numpy as np
 from trajectory_guard.body import ConvexBody, LARGEST_COORDINATE, U
 from trajectory_guard.errors import Reason, RobotError
 from trajectory_guard.mesh_formats import READERS, Triangles
-from trajectory_guard.resource import places
+from trajectory_guard.resource import ANY_MESH, MeshLimits, places
 from trajectory_guard.robot import Loaded
 from trajectory_guard.unique_rows import unique_rows
 
@@ -26,17 +26,20 @@ class MeshFile:
     :param uri: package URI, file URI or path.
     :param folder: where relative paths start.
     :param scale: factor along x, y, z; negative ones mirror.
+    :param limits: which files may be read.
     """
 
     uri: str
     folder: Path | None = None
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    limits: MeshLimits = ANY_MESH
 
     def load(self) -> Loaded:
         """
         Return the hull of the mesh, and the hash of the file it was built from.
 
-        :raises RobotError: MESH_MISSING names the places looked at, MESH_INVALID what is wrong.
+        :raises RobotError: MESH_MISSING names the places looked at, MESH_INVALID what is wrong;
+            MESH_FORBIDDEN, TOO_LARGE.
         """
         path = self._find()
         reader = READERS.get(path.suffix.lower())
@@ -45,7 +48,7 @@ class MeshFile:
                 Reason.MESH_INVALID, f'mesh {self.uri!r} is not one of {", ".join(READERS)}'
             )
         try:
-            content = path.read_bytes()
+            content = self.limits.read(path)
             body = mesh_body(reader(content), self.scale)
         except (OSError, ValueError) as error:
             raise RobotError(

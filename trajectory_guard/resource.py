@@ -1,12 +1,54 @@
-"""Where the file behind a URI of a robot description may lie."""
+"""Where the file behind a URI of a robot description may lie, and how large it may be."""
 
 from collections.abc import Iterator
 import os
 from pathlib import Path
+from typing import NamedTuple
 from urllib.parse import unquote
+
+from trajectory_guard.errors import Reason, RobotError
 
 PACKAGE = 'package://'
 FILE = 'file://'
+
+
+class MeshLimits(NamedTuple):
+    """
+    Which mesh files may be read.
+
+    :param roots: folders that they lie in, links resolved; empty: anywhere.
+    :param max_bytes: size of a file; None: any.
+    """
+
+    roots: tuple[Path, ...] = ()
+    max_bytes: int | None = None
+
+    def read(self, path: Path) -> bytes:
+        """
+        Return the content of a file.
+
+        :raises RobotError: MESH_FORBIDDEN, TOO_LARGE.
+        :raises OSError: it cannot be read.
+        """
+        # Links are followed once: the file that is checked is the one that is opened.
+        real = path.resolve(strict=True)
+        if self.roots and not any(real.is_relative_to(root.resolve()) for root in self.roots):
+            raise RobotError(
+                Reason.MESH_FORBIDDEN,
+                f'mesh {str(real)!r} does not lie in {", ".join(map(str, self.roots))}',
+            )
+        with real.open('rb') as file:
+            if self.max_bytes is None:
+                return file.read()
+            content = file.read(self.max_bytes + 1)
+        if len(content) > self.max_bytes:
+            raise RobotError(
+                Reason.TOO_LARGE, f'mesh {str(real)!r} is larger than {self.max_bytes} bytes'
+            )
+        return content
+
+
+ANY_MESH = MeshLimits()
 
 
 def places(uri: str, folder: Path | None) -> Iterator[Path]:

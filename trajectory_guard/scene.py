@@ -11,6 +11,7 @@ from trajectory_guard.body import ConvexBody, rigid_defect
 from trajectory_guard.errors import Reason, RobotError, SceneError
 from trajectory_guard.mesh import MeshFile
 from trajectory_guard.mesh_formats import READERS
+from trajectory_guard.resource import ANY_MESH, MeshLimits
 from trajectory_guard.robot import Robot
 from trajectory_guard.urdf import load_robot
 
@@ -52,7 +53,11 @@ class Scene:
     digest: str
 
 
-def load_scene(paths: str | Path | Iterable[str | Path], pose: np.ndarray | None = None) -> Scene:
+def load_scene(
+    paths: str | Path | Iterable[str | Path],
+    pose: np.ndarray | None = None,
+    limits: MeshLimits = ANY_MESH,
+) -> Scene:
     """
     Read a scene from URDF files, whose joints are all fixed, and mesh files.
 
@@ -61,6 +66,7 @@ def load_scene(paths: str | Path | Iterable[str | Path], pose: np.ndarray | None
     :param paths: one file or several.
     :param pose: pose of the files' root frame in the robot's root frame, (4, 4), rigid within
         1e-9 [m]; None: they are the same.
+    :param limits: which mesh files the URDF files may name, and how large any mesh file may be.
     :raises SceneError: a file is missing or unusable, a joint can move, two obstacles have one
         name, or there is none.
     """
@@ -71,7 +77,7 @@ def load_scene(paths: str | Path | Iterable[str | Path], pose: np.ndarray | None
     obstacles: dict[str, Obstacle] = {}
     for path in [paths] if isinstance(paths, str | Path) else paths:
         try:
-            content, found = _read(Path(path))
+            content, found = _read(Path(path), limits)
         except RobotError as error:
             reason = SCENE_REASONS.get(error.reason, error.reason)
             raise SceneError(reason, f'scene {str(path)!r}: {error}') from error
@@ -99,15 +105,15 @@ def _rigid(pose: np.ndarray | None) -> np.ndarray:
     return T
 
 
-def _read(path: Path) -> tuple[str, dict[str, tuple[ConvexBody, ...]]]:
+def _read(path: Path, limits: MeshLimits) -> tuple[str, dict[str, tuple[ConvexBody, ...]]]:
     """Return the hash of a file's content, and the bodies by name in the file's root frame."""
     if not path.is_file():
         raise SceneError(Reason.SCENE_MISSING, f'scene {str(path)!r} does not exist')
     if path.suffix.lower() in READERS:
-        loaded = MeshFile(str(path.absolute())).load()
+        loaded = MeshFile(str(path.absolute()), limits=limits._replace(roots=())).load()
         return loaded.content, {path.stem: (loaded.body,)}
     if path.suffix.lower() in URDF_SUFFIXES:
-        robot = load_robot(path)
+        robot = load_robot(path, limits)
         return robot.digest(), _bodies_in_root(robot)
     known = ', '.join((*URDF_SUFFIXES, *READERS))
     raise SceneError(Reason.SCENE_INVALID, f'scene {str(path)!r} is not one of {known}')

@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from trajectory_guard.errors import Reason, RobotError
+from trajectory_guard.resource import ANY_MESH, MeshLimits
 from trajectory_guard.robot import Collision, floating_joint, Joint, JointType, Mimic, Robot
 from trajectory_guard.urdf_elements import attribute, collision_of, joint_of, link_of, origin_of
 
@@ -23,10 +24,11 @@ PLAIN = ('revolute', 'continuous', 'prismatic', 'fixed')
 UNDETERMINED = (FLOATING, 'planar')
 
 
-def load_robot(path: str | Path) -> Robot:
+def load_robot(path: str | Path, limits: MeshLimits = ANY_MESH) -> Robot:
     """
     Read a URDF file; its meshes are read when they are first needed.
 
+    :param limits: which mesh files may be read.
     :raises RobotError: the file cannot be read, or describes no robot that can be judged.
     """
     path = Path(path)
@@ -35,14 +37,17 @@ def load_robot(path: str | Path) -> Robot:
     except OSError as error:
         raise RobotError(Reason.ROBOT_INVALID, f'cannot read {path}: {error}') from error
     with _about(str(path)):
-        return robot_from_urdf(content, path.parent)
+        return robot_from_urdf(content, path.parent, limits)
 
 
-def robot_from_urdf(text: str | bytes, folder: str | Path | None = None) -> Robot:
+def robot_from_urdf(
+    text: str | bytes, folder: str | Path | None = None, limits: MeshLimits = ANY_MESH
+) -> Robot:
     """
     Read a URDF document.
 
     :param folder: where relative mesh paths start and packages are looked for upwards.
+    :param limits: which mesh files may be read.
     :raises RobotError: the message names the element and the value that is wrong.
     """
     source = text.encode('utf-8', 'surrogatepass') if isinstance(text, str) else text
@@ -57,7 +62,9 @@ def robot_from_urdf(text: str | bytes, folder: str | Path | None = None) -> Robo
     collisions: dict[str, tuple[Collision, ...]] = {}
     for name in (base, *(link_of(joints[joint], 'child') for joint in order)):
         with _about(f'link {name!r}'):
-            found = tuple(collision_of(c, folder) for c in links[name].findall('collision'))
+            found = tuple(
+                collision_of(c, folder, limits) for c in links[name].findall('collision')
+            )
         if found:
             collisions[name] = found
     kept = _determined([joints[name] for name in order], base, set(collisions))

@@ -11,6 +11,7 @@ from trajectory_guard.errors import Reason, RobotError
 from trajectory_guard.mesh import MeshFile
 from trajectory_guard.pose import pose_matrix
 from trajectory_guard.primitive import Box, Cylinder, Sphere
+from trajectory_guard.resource import ANY_MESH, MeshLimits
 from trajectory_guard.robot import Collision, Joint, JointType, Mimic, Shape
 
 LIMITED = (JointType.REVOLUTE, JointType.PRISMATIC)
@@ -46,11 +47,14 @@ def link_of(joint: Element, role: str) -> str:
     return attribute(element, 'link') if element is not None else _missing(f'<{role}>')
 
 
-def collision_of(element: Element, folder: Path | None) -> Collision:
+def collision_of(
+    element: Element, folder: Path | None, limits: MeshLimits = ANY_MESH
+) -> Collision:
     """
     Return the geometry of a `<collision>`; mesh files are not touched.
 
     :param folder: where relative mesh paths start.
+    :param limits: which mesh files may be read.
     :raises RobotError: the geometry is missing, of an unknown kind, or its size is no length.
     """
     geometry = only(element, 'geometry')
@@ -58,7 +62,7 @@ def collision_of(element: Element, folder: Path | None) -> Collision:
         raise RobotError(
             Reason.ROBOT_INVALID, 'a <collision> needs one <geometry> with one shape in it'
         )
-    return Collision(origin_of(element), _shape(geometry[0], folder))
+    return Collision(origin_of(element), _shape(geometry[0], folder, limits))
 
 
 def origin_of(element: Element) -> np.ndarray:
@@ -154,7 +158,7 @@ def _mimic(element: Element) -> Mimic | None:
     return Mimic(attribute(mimic, 'joint'), multiplier, offset)
 
 
-def _shape(element: Element, folder: Path | None) -> Shape:
+def _shape(element: Element, folder: Path | None, limits: MeshLimits) -> Shape:
     match element.tag:
         case 'box':
             x, y, z = _numbers(element, 'size', 3)
@@ -169,7 +173,7 @@ def _shape(element: Element, folder: Path | None) -> Shape:
                 raise RobotError(
                     Reason.ROBOT_INVALID, f'mesh scale must be finite and not 0, got {x} {y} {z}'
                 )
-            return MeshFile(attribute(element, 'filename'), folder, (x, y, z))
+            return MeshFile(attribute(element, 'filename'), folder, (x, y, z), limits)
     raise RobotError(
         Reason.GEOMETRY_UNSUPPORTED,
         f'geometry <{element.tag}> is not one of box, cylinder, sphere, mesh',

@@ -3,14 +3,25 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
+import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rclpy.service_introspection import ServiceIntrospectionState
 
 from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.marker_scene import MarkerLimits
 from trajectory_guard.pose import pose_matrix
+from trajectory_guard.resource import MeshLimits
 from trajectory_guard.result import NANOSECONDS
 from trajectory_guard.settings import Cover, Settings
+
+INTROSPECTION = {
+    'off': ServiceIntrospectionState.OFF,
+    'metadata': ServiceIntrospectionState.METADATA,
+    'contents': ServiceIntrospectionState.CONTENTS,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +31,7 @@ class Configuration:
 
     :param robot_description_file: URDF of the robot; '': it comes from the topic.
     :param robot_description_topic: latched std_msgs/String with the URDF.
-    :param scene_files: URDF and mesh files of the scene; empty: there is no scene yet.
+    :param scene_files: URDF and mesh files of the scene.
     :param scene_pose: x, y, z, roll, pitch, yaw of the files' frame in the robot's root link
         [m, rad], as URDF writes an origin.
     :param settings: what holds for a request that asks for nothing else; its clearance and its
@@ -29,6 +40,16 @@ class Configuration:
         to; empty: there is one value, for all joints.
     :param max_points: points that a trajectory may have.
     :param max_joints: joints that a trajectory or a start state may have.
+    :param autostart: configure and activate without a manager.
+    :param live_scene: whether markers are part of the scene.
+    :param scene_topic: latched visualization_msgs/MarkerArray.
+    :param max_scene_age: age of the last markers up to which requests are answered [s]; 0: any.
+    :param joint_states_topic: sensor_msgs/JointState; '': not used.
+    :param max_state_age: up to which a joint state is fresh [s].
+    :param max_requests: requests that may be in flight.
+    :param marker_limits: how much the live scene may hold.
+    :param mesh_limits: which mesh files may be read.
+    :param introspection: what `~/certify/_service_event` tells.
     :raises RequestError: naming the parameter and its value.
     """
 
@@ -40,6 +61,16 @@ class Configuration:
     tracking_tolerance_joints: tuple[str, ...]
     max_points: int
     max_joints: int
+    autostart: bool
+    live_scene: bool
+    scene_topic: str
+    max_scene_age: float
+    joint_states_topic: str
+    max_state_age: float
+    max_requests: int
+    marker_limits: MarkerLimits
+    mesh_limits: MeshLimits
+    introspection: ServiceIntrospectionState
 
     def __post_init__(self) -> None:
         """Refuse what does not fit together; settings and ranges have been checked before."""
@@ -92,6 +123,20 @@ class Configuration:
             tracking_tolerance_joints=_named(values['tracking_tolerance_joints']),
             max_points=values['max_points'],
             max_joints=values['max_joints'],
+            autostart=values['autostart'],
+            live_scene=values['live_scene'],
+            scene_topic=values['scene_topic'],
+            max_scene_age=values['max_scene_age'],
+            joint_states_topic=values['joint_states_topic'],
+            max_state_age=values['max_state_age'],
+            max_requests=values['max_requests'] or 2 * (os.cpu_count() or 1),
+            marker_limits=MarkerLimits(
+                markers=values['max_markers'], mesh_bytes=values['max_mesh_bytes']
+            ),
+            mesh_limits=MeshLimits(
+                tuple(map(Path, _named(values['mesh_roots']))), values['max_mesh_bytes']
+            ),
+            introspection=_introspection(values['introspection']),
         )
 
     @property
@@ -119,6 +164,16 @@ class Configuration:
                     f'but {", ".join(named)}',
                 )
         return tuple(named[name] for name in joint_names)
+
+
+def _introspection(name: str) -> ServiceIntrospectionState:
+    """Return how much a service tells of its requests."""
+    if name not in INTROSPECTION:
+        raise RequestError(
+            Reason.INVALID_PARAMETER,
+            f'introspection must be one of {", ".join(INTROSPECTION)}, got {name!r}',
+        )
+    return INTROSPECTION[name]
 
 
 def _named(values: Sequence[str] | None) -> tuple[str, ...]:

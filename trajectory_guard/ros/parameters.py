@@ -13,6 +13,11 @@ from trajectory_guard.settings import LARGEST_LENGTH, Settings, SMALLEST_TOLERAN
 
 _DEFAULTS = Settings()
 
+# Each takes a thread.
+MOST_REQUESTS = 256
+
+AT_CONFIGURE = 'taken when the guard is configured; cannot change while it is active'
+
 
 class Declaration(NamedTuple):
     """
@@ -21,31 +26,62 @@ class Declaration(NamedTuple):
     :param default: value if nothing else is said; its type is the parameter's.
     :param description: what it means, with its unit.
     :param bounds: least and greatest value of a number; None: the configuration checks it.
-    :param read_only: it says what is loaded at the start.
+    :param read_only: it cannot change while the node runs.
+    :param at_configure: it says what is loaded when the node is configured, and cannot change
+        while that is in use.
     """
 
     default: Any
     description: str
     bounds: tuple[float, float] | tuple[int, int] | None = None
     read_only: bool = False
+    at_configure: bool = False
 
 
 DECLARATIONS = {
+    'autostart': Declaration(
+        True, 'configure and activate at the start, without a manager', read_only=True
+    ),
     'robot_description_file': Declaration(
-        '', 'URDF file of the robot; empty: from robot_description_topic', read_only=True
+        '', 'URDF file of the robot; empty: from robot_description_topic', at_configure=True
     ),
     'robot_description_topic': Declaration(
         'robot_description',
         'latched std_msgs/String with the URDF, read if robot_description_file is empty',
-        read_only=True,
+        at_configure=True,
     ),
     'scene_files': Declaration(
-        [''], 'URDF and mesh files of the scene; empty: the guard is not ready', read_only=True
+        [''],
+        'URDF and mesh files of the scene; empty: there is only the live scene',
+        at_configure=True,
     ),
     'scene_pose': Declaration(
         [0.0] * 6,
         'x, y, z [m], roll, pitch, yaw [rad] of the scene files in the root link of the robot',
-        read_only=True,
+        at_configure=True,
+    ),
+    'live_scene': Declaration(
+        False,
+        'markers belong to the scene, too; the guard is not ready before the first of them',
+        at_configure=True,
+    ),
+    'scene_topic': Declaration(
+        '~/scene',
+        'latched visualization_msgs/MarkerArray with the live scene',
+        at_configure=True,
+    ),
+    'max_scene_age': Declaration(
+        0.0,
+        'requests are rejected if the last markers came longer ago [s]; 0: they never get old',
+        (0.0, 3600.0),
+    ),
+    'joint_states_topic': Declaration(
+        'joint_states',
+        'sensor_msgs/JointState for requests that lack a start state; empty: not used',
+        at_configure=True,
+    ),
+    'max_state_age': Declaration(
+        0.5, 'a joint state is fresh up to this age, by arrival and by stamp [s]', (0.05, 10.0)
     ),
     'tolerance': Declaration(
         _DEFAULTS.tolerance,
@@ -102,6 +138,29 @@ DECLARATIONS = {
     'max_joints': Declaration(
         256, 'joints that a trajectory or a start state may have', (1, 10_000)
     ),
+    'max_requests': Declaration(
+        0,
+        'requests that may be in flight, more are rejected as busy; 0: twice the cores',
+        (0, MOST_REQUESTS),
+    ),
+    'max_markers': Declaration(
+        1000, 'markers that the live scene may have', (1, 100_000), at_configure=True
+    ),
+    'max_mesh_bytes': Declaration(
+        64 * 1024 * 1024,
+        'size that a mesh file may have [bytes]',
+        (1, 2**31 - 1),
+        at_configure=True,
+    ),
+    'mesh_roots': Declaration(
+        [''],
+        'folders that meshes of the robot, of scene files and of markers must lie in; '
+        'empty: anywhere',
+        at_configure=True,
+    ),
+    'introspection': Declaration(
+        'off', 'what ~/certify/_service_event tells of requests: off, metadata or contents'
+    ),
 }
 
 
@@ -143,7 +202,9 @@ def values(parameters: Iterable[Parameter]) -> dict[str, Any]:
 
 def _descriptor(declaration: Declaration) -> ParameterDescriptor:
     descriptor = ParameterDescriptor(
-        description=declaration.description, read_only=declaration.read_only
+        description=declaration.description,
+        read_only=declaration.read_only,
+        additional_constraints=AT_CONFIGURE if declaration.at_configure else '',
     )
     if declaration.bounds is not None:
         low, high = declaration.bounds

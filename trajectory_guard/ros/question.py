@@ -1,8 +1,8 @@
 """A request of the service as a question to the core."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 import dataclasses
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from msg_adapters.trajectory import (
     joint_state_from_message,
@@ -14,12 +14,16 @@ from trajectory_guard.result import NANOSECONDS
 from trajectory_guard.ros.configuration import Configuration
 from trajectory_guard.settings import Scope, Settings
 from trajectory_guard.trajectory import JointState, Trajectory
+from trajectory_guard.workcell import Workcell
 
 # The seconds of a Duration are an int32, and the answer gives the times back as Durations.
 LAST_INSTANT_NS = 2**31 * NANOSECONDS - 1
 
 # Values of the field `refine` of a request.
 REFINE_DEFAULT, REFINE_ON, REFINE_OFF = range(3)
+
+# Joint names and the greatest age [s] to the state of those that are known, and its age.
+Fresh: TypeAlias = Callable[[Collection[str], float], tuple[JointState, float] | None]
 
 
 class Question(NamedTuple):
@@ -67,6 +71,31 @@ def question_from_request(request: Any, configuration: Configuration) -> Questio
         start=joint_state_from_message(state) if given else None,
         settings=_settings(request, trajectory.joint_names, configuration),
     )
+
+
+def measured_start(
+    question: Question, workcell: Workcell, fresh: Fresh, configuration: Configuration
+) -> tuple[JointState, float] | None:
+    """
+    Return where the robot is, if the motion depends on it and it is known.
+
+    It does if the first point is later than time 0, for the controller goes there from wherever
+    the robot is; and on joints that the trajectory does not name, which stay where they are. If
+    one of the commanded joints is not known, none of them is: half a start is none.
+
+    :param question: without a start state.
+    :param workcell: with the robot.
+    :param fresh: as `JointStates.fresh`.
+    :param configuration: says how old a state may be.
+    :returns: the state and its age [s].
+    """
+    named = set(question.trajectory.joint_names)
+    others = {j.name for j in workcell.robot.movable if j.mimic is None and j.name not in named}
+    if question.trajectory.times_ns[0] > 0:
+        found = fresh(named | others, configuration.max_state_age)
+        if found is None or named <= set(found[0].joint_names):
+            return found
+    return fresh(others, configuration.max_state_age)
 
 
 def _check_sizes(request: Any, configuration: Configuration) -> None:
