@@ -2,14 +2,20 @@
 A client of the guard that shares nothing with it: another vendor's DDS, hand-written types.
 
 A program. It plays the robot's description to the guard's topic, then answers each line of JSON on
-its input by one on its output: {"points": ...} by what the guard says to that trajectory,
-{"garbage": [...]} by how many payloads it sent to the guard in place of requests.
+its input by one on its output:
+
+    {"points": [[seconds, [shoulder, elbow]], ...]}    what the guard says to that trajectory
+    {"garbage": ["...", ...]}    how many payloads it sent to the guard in place of requests
+    {"markers": [[id, type, position, scale], ...]}    the guard's status with that scene
+    {"moments": true}    how many markers the guard drew of what is not free
 """
 
+from collections.abc import Callable
 from dataclasses import asdict
 import json
 import sys
 import time
+from typing import Any
 
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
@@ -21,11 +27,18 @@ from foreign_types import (
     CertificationResult,
     Duration,
     Garbage,
+    GuardStatus,
+    Header,
     JointTrajectory,
     JointTrajectoryPoint,
+    Marker,
+    MarkerArray,
+    Point,
+    Pose,
     Request,
     Response,
     String,
+    Vector3,
 )
 
 PATIENCE = 60.0  # s
@@ -74,6 +87,10 @@ class Client:
         name = f'{namespace}/guard/certify'
         self._request = DataWriter(us, Topic(us, f'rq/{name}Request', Request), qos=QUEUE)
         self._reply = DataReader(us, Topic(us, f'rr/{name}Reply', Response), qos=QUEUE)
+        node = f'rt/{namespace}/guard'
+        self._scene = DataWriter(us, Topic(us, f'{node}/scene', MarkerArray), qos=LATCHED)
+        self._status = DataReader(us, Topic(us, f'{node}/status', GuardStatus), qos=LATCHED)
+        self._moments = DataReader(us, Topic(us, f'{node}/moments', MarkerArray), qos=QUEUE)
         other = DomainParticipant(domain)
         self._garbage = DataWriter(other, Topic(other, f'rq/{name}Request', Garbage), qos=QUEUE)
         self._asked = 0
@@ -108,6 +125,40 @@ class Client:
                 time.sleep(0.01)
         raise TimeoutError(f'no answer to {request}')
 
+    def show(self, markers: list[tuple[int, int, list[float], list[float]]]) -> GuardStatus:
+        """Publish a scene in the robot's root link, and return the status once it is ready."""
+        self._scene.write(
+            MarkerArray(
+                [
+                    Marker(
+                        header=Header(frame_id='base'),
+                        ns='seen',
+                        id=number,
+                        type=kind,
+                        action=0,
+                        pose=Pose(Point(*position)),
+                        scale=Vector3(*scale),
+                    )
+                    for number, kind, position, scale in markers
+                ]
+            )
+        )
+        return self._first(self._status, lambda status: status.ready)
+
+    def moments(self) -> int:
+        """Return how many markers the guard draws in the first message that adds any."""
+        drawn = self._first(self._moments, lambda array: any(m.action == 0 for m in array.markers))
+        return len(drawn.markers)
+
+    def _first(self, reader: DataReader, wanted: Callable[[Any], bool]) -> Any:
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
+            for sample in reader.take(100):
+                if wanted(sample):
+                    return sample
+            time.sleep(0.01)
+        raise TimeoutError(f'nothing wanted on {reader.topic.name}')
+
     def send(self, payloads: list[str]) -> int:
         """Send payloads, in hexadecimal, and return how many."""
         end = time.monotonic() + PATIENCE
@@ -124,12 +175,15 @@ def main() -> None:
     """Serve standard input until it ends."""
     client = Client(int(sys.argv[1]), sys.argv[2], sys.argv[3])
     for line in sys.stdin:
-        task = json.loads(line)
-        answer = (
-            client.send(task['garbage'])
-            if 'garbage' in task
-            else asdict(client.ask(task['points']))
-        )
+        ((task, value),) = json.loads(line).items()
+        if task == 'points':
+            answer = asdict(client.ask(value))
+        elif task == 'garbage':
+            answer = client.send(value)
+        elif task == 'markers':
+            answer = asdict(client.show(value))
+        else:
+            answer = client.moments()
         print(json.dumps(answer), flush=True)
 
 

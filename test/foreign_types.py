@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.annotations import final
-from cyclonedds.idl.types import float64, int32, sequence, uint8, uint32
+from cyclonedds.idl.types import float32, float64, int32, sequence, uint8, uint32
 
 REQUEST = 'trajectory_guard_interfaces.srv.dds_.CertifyTrajectory_Request_'
 
@@ -142,3 +142,99 @@ class Response(
 ):
     result: CertificationResult
     certificate: str
+
+
+@dataclass
+@final
+class GuardStatus(IdlStruct, typename='trajectory_guard_interfaces.msg.dds_.GuardStatus_'):
+    stamp: Time
+    ready: bool
+    reason_code: str
+    message: str
+    robot_hash: str
+    scene_hash: str
+
+
+@dataclass
+@final
+class Quaternion(IdlStruct, typename='geometry_msgs.msg.dds_.Quaternion_'):
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+    w: float64 = 1.0
+
+
+@dataclass
+@final
+class Pose(IdlStruct, typename='geometry_msgs.msg.dds_.Pose_'):
+    position: Point
+    orientation: Quaternion = field(default_factory=Quaternion)
+
+
+@dataclass
+@final
+class Vector3(IdlStruct, typename='geometry_msgs.msg.dds_.Vector3_'):
+    x: float64
+    y: float64
+    z: float64
+
+
+@dataclass
+@final
+class ColorRGBA(IdlStruct, typename='std_msgs.msg.dds_.ColorRGBA_'):
+    r: float32 = 0.5
+    g: float32 = 0.5
+    b: float32 = 0.5
+    a: float32 = 1.0
+
+
+@dataclass
+@final
+class UVCoordinate(IdlStruct, typename='visualization_msgs.msg.dds_.UVCoordinate_'):
+    u: float32
+    v: float32
+
+
+@dataclass
+@final
+class CompressedImage(IdlStruct, typename='sensor_msgs.msg.dds_.CompressedImage_'):
+    header: Header = field(default_factory=Header)
+    format: str = ''
+    data: sequence[uint8] = ()
+
+
+@dataclass
+@final
+class MeshFile(IdlStruct, typename='visualization_msgs.msg.dds_.MeshFile_'):
+    filename: str = ''
+    data: sequence[uint8] = ()
+
+
+@dataclass
+@final
+class Marker(IdlStruct, typename='visualization_msgs.msg.dds_.Marker_'):
+    header: Header
+    ns: str
+    id: int32
+    type: int32
+    action: int32
+    pose: Pose
+    scale: Vector3
+    color: ColorRGBA = field(default_factory=ColorRGBA)
+    lifetime: Duration = field(default_factory=Duration)
+    frame_locked: bool = False
+    points: sequence[Point] = ()
+    colors: sequence[ColorRGBA] = ()
+    texture_resource: str = ''
+    texture: CompressedImage = field(default_factory=CompressedImage)
+    uv_coordinates: sequence[UVCoordinate] = ()
+    text: str = ''
+    mesh_resource: str = ''
+    mesh_file: MeshFile = field(default_factory=MeshFile)
+    mesh_use_embedded_materials: bool = False
+
+
+@dataclass
+@final
+class MarkerArray(IdlStruct, typename='visualization_msgs.msg.dds_.MarkerArray_'):
+    markers: sequence[Marker]

@@ -1,6 +1,7 @@
 """The guard and a client that shares nothing with it, over the wire: another vendor's DDS."""
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 import dataclasses
 from importlib.util import find_spec
 import json
@@ -19,7 +20,7 @@ import pytest
 
 from msg_adapters.result import result_from_message
 from trajectory_guard.certify import judge
-from trajectory_guard.result import Result, Verdict
+from trajectory_guard.result import Result, Status, Verdict
 from trajectory_guard.scene import load_scene
 from trajectory_guard.settings import Settings
 from trajectory_guard.trajectory import Point, Trajectory
@@ -50,11 +51,11 @@ def guard(tmp_path_factory: pytest.TempPathFactory) -> Iterator[GuardProcess]:
         yield process
 
 
-@pytest.fixture(scope='module')
-def client(guard: GuardProcess) -> Iterator[Asking]:
+@contextmanager
+def foreign_client(namespace: str) -> Iterator[Asking]:
     """Yield what gives the client a task and returns its answer."""
     with subprocess.Popen(
-        [sys.executable, CLIENT, str(DOMAIN), 'foreign', ARM],
+        [sys.executable, CLIENT, str(DOMAIN), namespace, ARM],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -69,6 +70,12 @@ def client(guard: GuardProcess) -> Iterator[Asking]:
 
         yield answer
         process.stdin.close()
+
+
+@pytest.fixture(scope='module')
+def client(guard: GuardProcess) -> Iterator[Asking]:
+    with foreign_client('foreign') as answer:
+        yield answer
 
 
 @pytest.fixture(scope='module')
@@ -169,6 +176,25 @@ def test_no_payload_brings_the_guard_down(client: Asking, guard: GuardProcess) -
     assert client(points=FREE).verdict == Verdict.FREE
     assert guard.process.poll() is None
     assert 'Traceback' not in guard.said()
+
+
+def test_a_foreign_scene_is_checked(tmp_path: Path) -> None:
+    cylinder, cube = 3, 1
+    post = (1, cylinder, [0.0, 1.5, 0.0], [0.1, 0.1, 2.0])
+    wall = (2, cube, [-1.2, 0.0, 0.0], [0.2, 4.0, 2.0])
+    with (
+        guard_process(tmp_path, 'shown', *parameters(live_scene='true')),
+        foreign_client('shown') as answer,
+    ):
+        status = answer(markers=[post, wall])
+        assert status.ready
+        assert answer(points=FREE).verdict == Verdict.FREE
+        hit = answer(points=HIT)
+        assert hit.verdict == Verdict.COLLISION
+        assert hit.scene_hash == status.scene_hash
+        named = {row.obstacle for row in hit.intervals if row.status == Status.COLLISION}
+        assert named == {'seen/1', 'seen/2'}
+        assert answer(moments=True) > 0
 
 
 def test_the_client_shares_nothing() -> None:
