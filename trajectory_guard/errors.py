@@ -71,6 +71,29 @@ class Reason(str, Enum):
     # A certificate.
     CERTIFICATE_INVALID = 'certificate_invalid'
 
+    # The gate: where the robot is, and when the controller begins.
+    STATE_STALE = 'state_stale'
+    STATE_INCOMPLETE = 'state_incomplete'
+    STATE_CHANGED = 'state_changed'
+    STAMP_INVALID = 'stamp_invalid'
+    STAMP_UNCERTAIN = 'stamp_uncertain'
+    ENDS_IN_PAST = 'ends_in_past'
+
+    # The gate: what else it decides by.
+    PROVED_FREE = 'proved_free'
+    STOP = 'stop'
+    SUPERSEDED = 'superseded'
+    STOPPED = 'stopped'
+    CANCELED = 'canceled'
+    MULTI_DOF = 'multi_dof'
+    GUARD_MISSING = 'guard_missing'
+    GUARD_AMBIGUOUS = 'guard_ambiguous'
+    GUARD_NOT_READY = 'guard_not_ready'
+    GUARD_SILENT = 'guard_silent'
+    ANSWER_INVALID = 'answer_invalid'
+    SCENE_CHANGED = 'scene_changed'
+    CONTROLLER_MISSING = 'controller_missing'
+
     # The guard itself.
     BUSY = 'busy'
     NOT_READY = 'not_ready'
