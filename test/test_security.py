@@ -1,17 +1,19 @@
 """The policy of docs/security.md: who may do what, and that the nodes need no more."""
 
-from collections.abc import Iterator
+from collections.abc import Callable
+from contextlib import suppress
 import os
 from pathlib import Path
-import signal
 import stat
 import subprocess
 import sys
+import time
+from typing import Any
 import xml.etree.ElementTree as ET
 
+from gate_process import gate_process
 from guard_process import (
     ARM,
-    Asker,
     asker,
     ENVIRONMENT,
     EXECUTABLE,
@@ -21,6 +23,9 @@ from guard_process import (
     SCENE,
 )
 import pytest
+from rclpy.node import Node, NodeNameNonExistentError
+
+Start = Callable[..., Any]
 
 ROOT = Path(__file__).parents[1]
 POLICY = ROOT / 'security' / 'policies' / 'trajectory_guard.policy.xml'
@@ -119,32 +124,43 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope='module')
-def ask(files: Path) -> Iterator[Asker]:
-    """Yield a client beside a guard whose robot comes from the topic."""
-    arguments = parameters(scene_files=f'[{files / "scene.urdf"}]')
-    with guard_process(files, 'guarded', *arguments) as process, asker() as made:
-        made.wait('guarded', process)
-        yield made
-        assert process.stop(signal.SIGTERM) == 0
+@pytest.mark.parametrize(
+    ('name', 'start', 'enclave'),
+    [('guard', guard_process, GUARD), ('gate', gate_process, GATE)],
+    ids=['guard', 'gate'],
+)
+def test_the_policy_allows_what_a_node_does(
+    keystore: Path, tmp_path: Path, name: str, start: Start, enclave: str
+) -> None:
+    """Listed are the ends of topics and services that the node has, and is allowed to have."""
+    here = f'/{name}_house'
+    with start(tmp_path, here[1:]) as process, asker() as ask:
+        seen = [set[str](), set[str]()]
+        for _ in range(int(PATIENCE)):
+            before = seen
+            with suppress(NodeNameNonExistentError):
+                seen = ends(ask.node, name, here)
+            if f'rr{here}/{name}/get_parametersReply' in seen[0] and seen == before:
+                break
+            assert process.process.poll() is None, process.said()
+            time.sleep(1.0)
+    for right, topics in zip(('publish', 'subscribe'), seen, strict=True):
+        assert f'rt{here}/{name}/status' in seen[0]
+        rooted = {topic.replace(f'{here}/', '/', 1) for topic in topics}
+        assert rooted <= allowed(keystore, enclave, right)
 
 
-def test_the_policy_allows_what_the_guard_does(keystore: Path, ask: Asker) -> None:
-    node, name = ask.node, ('guard', '/guarded')
-    used = {
-        'publish': {
-            *(f'rt{topic}' for topic, _ in node.get_publisher_names_and_types_by_node(*name)),
-            *(f'rr{s}Reply' for s, _ in node.get_service_names_and_types_by_node(*name)),
-        },
-        'subscribe': {
-            *(f'rt{topic}' for topic, _ in node.get_subscriber_names_and_types_by_node(*name)),
-            *(f'rq{s}Request' for s, _ in node.get_service_names_and_types_by_node(*name)),
-        },
-    }
-    for right, topics in used.items():
-        assert {'rq/guarded/guard/certifyRequest', 'rr/guarded/guard/certifyReply'} & topics
-        here = {topic.replace('/guarded/', '/', 1) for topic in topics}
-        assert here <= allowed(keystore, GUARD, right)
+def ends(node: Node, name: str, namespace: str) -> list[set[str]]:
+    """Return the DDS topics that a node publishes, and those it subscribes to."""
+    writes = {f'rt{t}' for t, _ in node.get_publisher_names_and_types_by_node(name, namespace)}
+    reads = {f'rt{t}' for t, _ in node.get_subscriber_names_and_types_by_node(name, namespace)}
+    for service, _ in node.get_service_names_and_types_by_node(name, namespace):
+        writes.add(f'rr{service}Reply')
+        reads.add(f'rq{service}Request')
+    for service, _ in node.get_client_names_and_types_by_node(name, namespace):
+        writes.add(f'rq{service}Request')
+        reads.add(f'rr{service}Reply')
+    return [writes, reads]
 
 
 def test_without_a_key_the_guard_does_not_run(files: Path) -> None:
