@@ -1,5 +1,5 @@
 """
-Make a keystore from a policy where `ros2 security` is not installed: Python and openssl will do.
+Make a keystore from a policy where `ros2 security` is not installed: Python and openssl 3 will do.
 
     python security/keystore.py POLICY.xml KEYSTORE [--domain N]
 
