@@ -117,7 +117,9 @@ def refusal(path: JointPath, slack: np.ndarray) -> RequestError | None:
         return RequestError(
             Reason.INVALID_PARAMETER, 'coefficient_error must be >= 0 and not NaN everywhere'
         )
-    size = (np.abs(path.coefficients).sum(axis=2) + path.coefficient_error).max(axis=0)
+    # A sum that overflows is too large, too.
+    with np.errstate(over='ignore'):
+        size = (np.abs(path.coefficients).sum(axis=2) + path.coefficient_error).max(axis=0)
     # A sum in another order may round to the other side of the limit.
     fits = size <= LARGEST * (1.0 - 2.0**-40)
     if fits.all():
