@@ -77,6 +77,7 @@ class Manager:
         self._name = f'/{namespace}/guard'
         self._clients: dict[str, Any] = {}
         self.statuses: list[GuardStatus] = []
+        self._seen = 0
         self._node.create_subscription(
             GuardStatus, f'{self._name}/status', self.statuses.append, LATCHED
         )
@@ -108,13 +109,18 @@ class Manager:
         return '' if result.successful else result.reason or 'refused'
 
     def says(self, wanted: Callable[[GuardStatus], bool]) -> GuardStatus:
-        """Return the last status, as soon as it is as wanted."""
-        return eventually(lambda: self.statuses[-1] if self.statuses else None, wanted)
+        """Return the first status that is as wanted, from the one returned last on."""
+
+        def found() -> int | None:
+            later = range(self._seen, len(self.statuses))
+            return next((i for i in later if wanted(self.statuses[i])), None)
+
+        # Another guard of the name may have said something after it.
+        self._seen = eventually(found, lambda _: True)
+        return self.statuses[self._seen]
 
 
-def eventually(
-    value: Callable[[], Any], wanted: Callable[[Any], bool], patience: float = 20.0
-) -> Any:
+def eventually(value: Callable[[], Any], wanted: Callable[[Any], bool]) -> Any:
     """Return a value as soon as it is as wanted."""
     end = time.monotonic() + SOON
     while time.monotonic() < end:
@@ -122,7 +128,7 @@ def eventually(
         if found is not None and wanted(found):
             return found
         time.sleep(0.02)
-    raise AssertionError(value())
+    raise AssertionError(f'not in time: {value()}')
 
 
 def rejection(result: Result) -> str:
@@ -457,11 +463,14 @@ def test_live_scene_and_two_of_one_name(ask: Asker, files: Path) -> None:
 
         # One that is there all the same stops the first, as long as it lives.
         with guard_process(files, 'live', *arguments, *parameters(autostart='false')) as second:
+            eventually(
+                lambda: ask.result('live', FREE),
+                lambda r: r.reason_code == Reason.DUPLICATE_NAME,
+            )
             manager.says(lambda said: said.reason_code == Reason.DUPLICATE_NAME)
-            assert rejection(ask.result('live', FREE)) == Reason.DUPLICATE_NAME
             assert second.stop(signal.SIGTERM) == 0
+        eventually(lambda: ask.result('live', FREE), lambda r: r.verdict is Verdict.FREE)
         manager.says(lambda said: said.ready)
-        assert ask.result('live', FREE).verdict is Verdict.FREE
 
         # Killed, there is no answer, and who takes its place need not wait for its ghost to go.
         lost = ask.client('live').call_async(LONG)

@@ -1,10 +1,7 @@
 """The node `guard`: certifies trajectories on request."""
 
 from collections.abc import Sequence
-from contextlib import suppress
-from copy import copy
 import dataclasses
-import threading
 import time
 from typing import Any
 
@@ -31,11 +28,12 @@ from trajectory_guard.ros.configuration import Configuration
 from trajectory_guard.ros.health import Health
 from trajectory_guard.ros.joint_states import JointStates
 from trajectory_guard.ros.managed import ManagedNode
-from trajectory_guard.ros.model import LATCHED, Model
+from trajectory_guard.ros.model import Model
 from trajectory_guard.ros.moments import MomentsPublisher
 from trajectory_guard.ros.namesakes import Namesakes
 from trajectory_guard.ros.parameters import DECLARATIONS, declare, values
 from trajectory_guard.ros.question import measured_start, Question, question_from_request
+from trajectory_guard.ros.status import StatusPublisher
 from trajectory_guard.warm import warm_up
 from trajectory_guard.workcell import Workcell
 
@@ -80,9 +78,7 @@ class Guard(ManagedNode):
         )
         self._quiet = False
 
-        self._saying = threading.Lock()
-        self._said = GuardStatus()
-        self._publisher = self.create_publisher(GuardStatus, STATUS, LATCHED)
+        self._status_publisher = StatusPublisher(self, STATUS)
         self._health = Health(self, 'certify', self._health_state)
         self._moments = MomentsPublisher(self)
         self._judged: tuple[Result, Workcell, Question] | None = None
@@ -242,18 +238,16 @@ class Guard(ManagedNode):
             raise stale
         return workcell
 
-    def _status(self) -> tuple[GuardStatus, Workcell | None]:
-        status = GuardStatus()
+    def _status(self) -> GuardStatus:
         try:
             if self._admission.closed:
                 raise RequestError(Reason.NOT_READY, 'the guard is shutting down')
             workcell = self._workcell(self._configuration)
         except TrajectoryGuardError as error:
-            status.reason_code, status.message = str(error.reason), str(error)
-            return status, None
-        status.ready = True
-        status.robot_hash, status.scene_hash = workcell.robot_hash, workcell.scene_hash
-        return status, workcell
+            return GuardStatus(reason_code=str(error.reason), message=str(error))
+        return GuardStatus(
+            ready=True, robot_hash=workcell.robot_hash, scene_hash=workcell.scene_hash
+        )
 
     def _watch(self) -> None:
         self._namesakes.look()
@@ -261,30 +255,24 @@ class Guard(ManagedNode):
 
     def _say_state(self) -> None:
         """Say whether the guard is ready, and for what, if that has changed."""
-        with self._saying:
-            status, workcell = self._status()
-            before, self._said = self._said, status
-            if status == before:
-                return
-            stamped = copy(status)
-            stamped.stamp = self.get_clock().now().to_msg()
-            # The context may be shut down by now.
-            with suppress(Exception):
-                self._publisher.publish(stamped)
-        if workcell is None:
-            # That it is inactive at the start is nothing to be warned of.
-            if self._active or before.ready:
-                self.get_logger().warning(f'not ready: {status.message}')
-        else:
+        before = self._status_publisher.renew(self._status)
+        if before is None:
+            return
+        status, model = self._status_publisher.said, self._model
+        workcell = model.value if model is not None else None
+        if status.ready and isinstance(workcell, Workcell):
             self.get_logger().info(
                 f'ready: robot {workcell.robot.name!r} ({workcell.robot_hash[:12]}), '
                 f'{len(workcell.robot.collision_links)} links; scene '
                 f'({workcell.scene_hash[:12]}), {len(workcell.scene.obstacles)} obstacles'
             )
+        elif self._active or before.ready:
+            # That it is inactive at the start is nothing to be warned of.
+            self.get_logger().warning(f'not ready: {status.message}')
         self._health.changed()
 
     def _health_state(self) -> tuple[bytes, str]:
-        said = self._said
+        said = self._status_publisher.said
         if said.ready:
             return DiagnosticStatus.OK, 'ready'
         level = DiagnosticStatus.ERROR if self._active else DiagnosticStatus.WARN
