@@ -32,6 +32,9 @@ ENVIRONMENT = {'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'L
 # The kernels may have to be compiled first, on a busy machine [s].
 PATIENCE = 300.0
 
+# An answer that has not come by then is lost [s].
+AGAIN = 20.0
+
 # A client keeps this many requests that are not delivered yet; it drops older ones.
 QUEUE = QoSProfile(depth=100)
 
@@ -204,8 +207,14 @@ class Asker:
         """Return the answer to one request."""
         if namespace not in self._clients:
             self._clients[namespace] = self.client(namespace)
-        (response,) = gathered([self._clients[namespace].call_async(request)])
-        return response
+        for _ in range(int(PATIENCE / AGAIN)):
+            done = threading.Event()
+            future = self._clients[namespace].call_async(request)
+            future.add_done_callback(lambda _, done=done: done.set())
+            # DDS may see a server before that one sees where to answer.
+            if done.wait(AGAIN):
+                return future.result()
+        raise AssertionError(f'no answer from {namespace}')
 
     def result(self, namespace: str, request: CertifyTrajectory.Request) -> Result:
         """Return the result in the answer to one request."""

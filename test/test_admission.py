@@ -41,6 +41,16 @@ def test_leaves_with_an_error_too() -> None:
     assert admission.empty
 
 
+def test_an_answer_counts_until_it_has_left() -> None:
+    admission = Admission()
+    admission.taken()
+    with admission.entered(1):
+        pass
+    assert not admission.empty
+    admission.sent()
+    assert admission.empty
+
+
 def test_closed_lets_nobody_in_and_everybody_out() -> None:
     admission = Admission()
     with admission.entered(2):

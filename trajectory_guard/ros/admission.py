@@ -12,7 +12,7 @@ class Admission:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._inside = 0
+        self._inside = self._unsent = 0
         self._closed = False
 
     @contextmanager
@@ -37,6 +37,16 @@ class Admission:
             with self._lock:
                 self._inside -= 1
 
+    def taken(self) -> None:
+        """Count a request, let in or not, until its answer has left."""
+        with self._lock:
+            self._unsent += 1
+
+    def sent(self) -> None:
+        """Tell that the answer to one has left."""
+        with self._lock:
+            self._unsent -= 1
+
     def close(self) -> None:
         """Let nobody in any more."""
         with self._lock:
@@ -49,5 +59,5 @@ class Admission:
 
     @property
     def empty(self) -> bool:
-        """Whether nobody is inside."""
-        return not self._inside
+        """Whether nobody is inside, and no answer has yet to leave."""
+        return not (self._inside or self._unsent)

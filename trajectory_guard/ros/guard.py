@@ -25,7 +25,7 @@ THREADS = MOST_REQUESTS + 16
 LOOK_UP = 0.2
 
 # How long requests in flight may take to end when the guard stops, and an answer to leave [s].
-GRACE = 2.0
+GRACE = 3.0
 SENDING = 0.05
 
 BAD_INPUT = 2

@@ -1,7 +1,8 @@
 """The node `guard`: certifies trajectories on request."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import dataclasses
+from functools import partial
 import time
 from typing import Any
 
@@ -170,6 +171,9 @@ class Guard(ManagedNode):
                 qos_profile=REQUESTS,
                 callback_group=ReentrantCallbackGroup(),
             )
+            # The executor does not tell when an answer has left.
+            send = self._service.send_response
+            self._service.send_response = partial(self._send, send)  # type: ignore[method-assign]
             self._introspect()
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -327,6 +331,7 @@ class Guard(ManagedNode):
         self, request: CertifyTrajectory.Request, response: CertifyTrajectory.Response
     ) -> CertifyTrajectory.Response:
         begin = time.perf_counter()
+        self._admission.taken()
         try:
             result = self._answer(request)
             response.result = result_to_message(result, self._types)
@@ -344,6 +349,13 @@ class Guard(ManagedNode):
             result.message,
         )
         return response
+
+    def _send(self, send: Callable[..., None], *answer: object) -> None:
+        """Send an answer, and count it as sent."""
+        try:
+            send(*answer)
+        finally:
+            self._admission.sent()
 
     def _answer(self, request: CertifyTrajectory.Request) -> Result:
         configuration = self._configuration
