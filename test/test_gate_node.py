@@ -38,7 +38,8 @@ from trajectory_guard.certify import judge
 from trajectory_guard.entry import Measured
 from trajectory_guard.errors import Reason
 from trajectory_guard.result import Verdict
-from trajectory_guard.ros.gate_parameters import DECLARATIONS, GateConfiguration
+from trajectory_guard.ros.gate_configuration import GateConfiguration
+from trajectory_guard.ros.gate_parameters import DECLARATIONS
 from trajectory_guard.ros.gate_request import request_for
 from trajectory_guard.scene import load_scene
 from trajectory_guard.settings import Settings

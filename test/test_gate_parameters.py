@@ -17,7 +17,8 @@ import yaml
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.ros.gate import Gate
 from trajectory_guard.ros.gate_codes import PASSED, REMEDIES, remedy
-from trajectory_guard.ros.gate_parameters import DECLARATIONS, GateConfiguration
+from trajectory_guard.ros.gate_configuration import GateConfiguration
+from trajectory_guard.ros.gate_parameters import DECLARATIONS
 
 ROOT = Path(__file__).parent.parent
 CONFIG = ROOT / 'config' / 'guard.yaml'

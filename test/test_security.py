@@ -180,3 +180,34 @@ def test_without_a_key_the_guard_does_not_run(files: Path) -> None:
     )
     assert done.returncode == 2, done.stderr
     assert 'SECURITY ERROR' in done.stderr
+
+
+@pytest.mark.skipif(
+    '_ROS_WHEELS_BOOTSTRAP_COMPLETE' not in os.environ, reason='this ROS may have DDS security'
+)
+@pytest.mark.parametrize(
+    ('executable', 'enclave'),
+    [(EXECUTABLE, GUARD), (EXECUTABLE.with_name('gate'), GATE)],
+    ids=['guard', 'gate'],
+)
+def test_without_security_in_the_middleware_no_node_runs(
+    keystore: Path, files: Path, executable: Path, enclave: str
+) -> None:
+    done = subprocess.run(
+        [executable],
+        env=os.environ
+        | ENVIRONMENT
+        | {
+            'ROS_SECURITY_ENABLE': 'true',
+            'ROS_SECURITY_STRATEGY': 'Enforce',
+            'ROS_SECURITY_KEYSTORE': str(keystore),
+            'ROS_SECURITY_ENCLAVE_OVERRIDE': enclave,
+        },
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=PATIENCE,
+    )
+    assert done.returncode == 2, done.stderr
+    assert 'security libraries' in done.stderr
+    assert 'Traceback' not in done.stderr

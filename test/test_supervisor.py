@@ -22,6 +22,7 @@ from guard_process import (
 import pytest
 
 from trajectory_guard.result import Verdict
+from trajectory_guard.ros import supervisor
 
 # Runs two shell scripts as guard and gate, which stop quickly if at all.
 SUPERVISE = """
@@ -32,7 +33,7 @@ supervisor.GRACE = 1.0
 names = ['guard', 'gate']
 try:
     programs = [
-        supervisor.Program(name, ['bash', '-c', script], f'no {name} now')
+        supervisor.Program(name, ['bash', '-c', script], f'no {name} now', {'NAME': name})
         for name, script in zip(names, sys.argv[1:])
     ]
     sys.exit(supervisor.supervise(programs))
@@ -58,6 +59,20 @@ PROFILE = {
     'FASTRTPS_DEFAULT_PROFILES_FILE': str(Path(__file__).parent.parent / 'config' / 'fastdds.xml')
 }
 LEASE_OF_FAST_DDS = 20.0
+
+
+def test_each_program_has_its_own_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+    monkeypatch.setattr(supervisor, 'supervise', lambda programs: seen.extend(programs) or 0)
+    monkeypatch.setenv('ROS_SECURITY_ENABLE', 'true')
+    assert supervisor.main(['supervisor']) == 0
+    assert [program.environment for program in seen] == [
+        {'ROS_SECURITY_ENCLAVE_OVERRIDE': f'/trajectory_guard/{name}'}
+        for name in ('guard', 'gate')
+    ]
+    monkeypatch.setenv('ROS_SECURITY_ENABLE', 'false')
+    assert supervisor.main(['supervisor']) == 0
+    assert [program.environment for program in seen[2:]] == [{}, {}]
 
 
 class Supervised:
@@ -129,12 +144,10 @@ def started(folder, command, **environment):
 @pytest.fixture
 def supervised(tmp_path):
     """Return a function that runs stand-ins for guard and gate under a supervisor."""
-    with_names = [f'NAME={name}; ' for name in ('guard', 'gate')]
     running = []
 
     def run(guard, gate):
-        scripts = [name + script for name, script in zip(with_names, (guard, gate), strict=True)]
-        running.append(context := started(tmp_path, ['-c', SUPERVISE, *scripts]))
+        running.append(context := started(tmp_path, ['-c', SUPERVISE, guard, gate]))
         return context.__enter__()
 
     yield run

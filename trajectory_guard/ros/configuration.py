@@ -15,6 +15,7 @@ from trajectory_guard.marker_scene import MarkerLimits
 from trajectory_guard.pose import pose_matrix
 from trajectory_guard.resource import MeshLimits
 from trajectory_guard.result import NANOSECONDS
+from trajectory_guard.ros.declared import names_in, per_joint
 from trajectory_guard.settings import Cover, Settings
 
 INTROSPECTION = {
@@ -105,7 +106,7 @@ class Configuration:
         return cls(
             robot_description_file=values['robot_description_file'],
             robot_description_topic=values['robot_description_topic'],
-            scene_files=_named(values['scene_files']),
+            scene_files=names_in(values['scene_files']),
             scene_pose=tuple(values['scene_pose'] or ()),
             settings=Settings(
                 tolerance=values['tolerance'],
@@ -120,7 +121,7 @@ class Configuration:
                 check_joint_limits=values['check_joint_limits'],
                 allow_nonzero_end_velocity=values['allow_nonzero_end_velocity'],
             ),
-            tracking_tolerance_joints=_named(values['tracking_tolerance_joints']),
+            tracking_tolerance_joints=names_in(values['tracking_tolerance_joints']),
             max_points=values['max_points'],
             max_joints=values['max_joints'],
             autostart=values['autostart'],
@@ -152,23 +153,17 @@ class Configuration:
         :returns: one value per joint [rad or m].
         :raises RequestError: the parameter has no value for one of them.
         """
-        values = self.settings.tracking_tolerance
-        if not self.tracking_tolerance_joints:
-            return values * len(joint_names)
-        named = dict(zip(self.tracking_tolerance_joints, values, strict=True))
-        for name in joint_names:
-            if name not in named:
-                raise RequestError(
-                    Reason.INVALID_TRACKING_TOLERANCE,
-                    f'tracking_tolerance_joints of the guard has no joint {name!r}, '
-                    f'but {", ".join(named)}',
-                )
-        return tuple(named[name] for name in joint_names)
+        return per_joint(
+            joint_names,
+            self.settings.tracking_tolerance,
+            self.tracking_tolerance_joints,
+            whose='the guard',
+        )
 
 
 def _folders(names: Sequence[str] | None) -> tuple[Path, ...]:
     """Return folders that do not depend on where the process is."""
-    folders = tuple(map(Path, _named(names)))
+    folders = tuple(map(Path, names_in(names)))
     for folder in folders:
         if not folder.is_absolute():
             raise RequestError(
@@ -185,8 +180,3 @@ def _introspection(name: str) -> ServiceIntrospectionState:
             f'introspection must be one of {", ".join(INTROSPECTION)}, got {name!r}',
         )
     return INTROSPECTION[name]
-
-
-def _named(values: Sequence[str] | None) -> tuple[str, ...]:
-    """Return the names in a list; ROS cannot write an empty list of strings but as ['']."""
-    return tuple(value for value in values or () if value)

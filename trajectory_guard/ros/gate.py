@@ -1,39 +1,35 @@
 """The node `gate`: stands before the controller, and passes on what the guard proves free."""
 
-from collections.abc import Callable, Sequence
-import os
-import signal
-import sys
+from collections.abc import Sequence
 import threading
 import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
-import rclpy
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.exceptions import NameValidationException
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args, try_shutdown
 from sensor_msgs.msg import JointState
 from trajectory_guard_interfaces.msg import GateDecision, GateStatus
 from trajectory_msgs.msg import JointTrajectory
 
 from trajectory_guard.errors import Reason, RequestError, TrajectoryGuardError
+from trajectory_guard.ros.declared import declare, values_of
 from trajectory_guard.ros.gate_action import action_before
 from trajectory_guard.ros.gate_codes import remedy
+from trajectory_guard.ros.gate_configuration import GateConfiguration
 from trajectory_guard.ros.gate_guard import GuardClient
-from trajectory_guard.ros.gate_parameters import declare, GateConfiguration, values_of
+from trajectory_guard.ros.gate_parameters import DECLARATIONS
 from trajectory_guard.ros.gate_states import JointStates
 from trajectory_guard.ros.gatekeeper import Gatekeeper
 from trajectory_guard.ros.health import Health
+from trajectory_guard.ros.process import LOOK_UP, made, on_signal, run
 
 NAME = 'gate'
 
@@ -48,12 +44,6 @@ STATES = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 CLOCK_PERIOD = 0.02
 STATUS_PERIOD = 0.2
 
-# How long a signal may go unnoticed [s].
-LOOK_UP = 0.2
-
-BAD_INPUT = 2
-INTERNAL_ERROR = 3
-
 
 class Gate(Node):
     """
@@ -67,7 +57,7 @@ class Gate(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(NAME, **options)
-        self._values = declare(self)
+        self._values = declare(self, DECLARATIONS)
         configuration = GateConfiguration.from_values(self._values)
         self._counts = {'passed': 0, 'stops': 0, 'held': 0}
         self._said: tuple[bool, str, tuple[int, ...]] | None = None
@@ -139,13 +129,13 @@ class Gate(Node):
 
     def _check_parameters(self, changed: Sequence[Parameter]) -> SetParametersResult:
         try:
-            GateConfiguration.from_values(self._values | values_of(changed))
+            GateConfiguration.from_values(self._values | values_of(changed, DECLARATIONS))
         except TrajectoryGuardError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def _apply_parameters(self, changed: Sequence[Parameter]) -> None:
-        self._values |= values_of(changed)
+        self._values |= values_of(changed, DECLARATIONS)
         self._keeper.configuration = GateConfiguration.from_values(self._values)
 
     # What goes out
@@ -231,44 +221,16 @@ def main(args: Sequence[str] | None = None) -> int:
     :param args: command line, the program first; None: that of the process.
     :returns: exit code: 0 stopped, 2 an argument or a parameter cannot be used.
     """
-    # There is nothing to end in good order yet.
-    _on_signal(lambda: os._exit(0))
-    try:
-        _start_ros(sys.argv if args is None else list(args))
-        _serve()
-    except TrajectoryGuardError as error:
-        get_logger(NAME).fatal(f'{error.reason}: {error}')
-        return INTERNAL_ERROR if error.reason is Reason.INTERNAL_ERROR else BAD_INPUT
-    finally:
-        try_shutdown()
-    return 0
-
-
-def _on_signal(action: Callable[[], None]) -> None:
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: action())
-
-
-def _start_ros(args: list[str]) -> None:
-    try:
-        unknown = remove_ros_args(args)[1:]
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:
-        raise RequestError(Reason.INVALID_PARAMETER, ' '.join(str(error).split())) from error
-    if unknown:
-        raise RequestError(
-            Reason.INVALID_PARAMETER,
-            f'unknown arguments {unknown}; ROS arguments come after --ros-args',
-        )
+    return run(NAME, args, _serve)
 
 
 def _serve() -> None:
     """Decide until a signal comes; what is undecided then is not passed on."""
     executor = SingleThreadedExecutor()
-    gate = Gate()
+    gate = made(Gate)
     executor.add_node(gate)
     stop = threading.Event()
-    _on_signal(stop.set)
+    on_signal(stop.set)
     while not stop.is_set():
         try:
             executor.spin_once(timeout_sec=LOOK_UP)

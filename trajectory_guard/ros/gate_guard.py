@@ -6,12 +6,17 @@ from typing import Any
 from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from rclpy.task import Future
 from trajectory_guard_interfaces.msg import CertificationResult, GuardStatus
 from trajectory_guard_interfaces.srv import CertifyTrajectory
 
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.ros.model import LATCHED
+
+# The middleware brings every client the answers to all; with the usual ten places those to others
+# would push its own out while it waits for a core.
+_ANSWERS = QoSProfile(depth=1000)
 
 _LEAST = ('tracking_tolerance', 'tracking_tolerance_joints')
 
@@ -28,8 +33,12 @@ class GuardClient:
     def __init__(self, node: Node, guard: str, changed: Callable[[], None]) -> None:
         self._node = node
         self._service = node.resolve_service_name(f'{guard}/certify')
-        self._certify = node.create_client(CertifyTrajectory, f'{guard}/certify')
-        self._parameters = node.create_client(GetParameters, f'{guard}/get_parameters')
+        self._certify = node.create_client(
+            CertifyTrajectory, f'{guard}/certify', qos_profile=_ANSWERS
+        )
+        self._parameters = node.create_client(
+            GetParameters, f'{guard}/get_parameters', qos_profile=_ANSWERS
+        )
         self._status: GuardStatus | None = None
         self._changed = changed
         node.create_subscription(GuardStatus, f'{guard}/status', self._take, LATCHED)

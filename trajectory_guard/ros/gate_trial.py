@@ -8,7 +8,7 @@ from rclpy.task import Future
 from trajectory_guard_interfaces.msg import CertificationResult, GateDecision
 from trajectory_guard_interfaces.srv import CertifyTrajectory
 
-from trajectory_guard.ros.gate_parameters import GateConfiguration
+from trajectory_guard.ros.gate_configuration import GateConfiguration
 from trajectory_guard.takeover import Takeover
 from trajectory_guard.trajectory import Trajectory
 

@@ -26,13 +26,14 @@ from trajectory_guard.errors import Reason, RequestError, TrajectoryGuardError
 from trajectory_guard.result import Result
 from trajectory_guard.ros.admission import Admission
 from trajectory_guard.ros.configuration import Configuration
+from trajectory_guard.ros.declared import declare, values_of
 from trajectory_guard.ros.health import Health
 from trajectory_guard.ros.joint_states import JointStates
 from trajectory_guard.ros.managed import ManagedNode
 from trajectory_guard.ros.model import Model
 from trajectory_guard.ros.moments import MomentsPublisher
 from trajectory_guard.ros.namesakes import Namesakes
-from trajectory_guard.ros.parameters import DECLARATIONS, declare, values
+from trajectory_guard.ros.parameters import DECLARATIONS
 from trajectory_guard.ros.question import measured_start, Question, question_from_request
 from trajectory_guard.ros.status import StatusPublisher
 from trajectory_guard.warm import warm_up
@@ -63,7 +64,7 @@ class Guard(ManagedNode):
     def __init__(self, **options: Any) -> None:
         super().__init__(NAME, **options)
         try:
-            self._values = declare(self)
+            self._values = declare(self, DECLARATIONS)
             self._configuration = self._checked(self._values)
         except TrajectoryGuardError:
             self.destroy_node()
@@ -298,7 +299,7 @@ class Guard(ManagedNode):
         return configuration
 
     def _check_parameters(self, changed: Sequence[Parameter]) -> SetParametersResult:
-        new = values(changed)
+        new = values_of(changed, DECLARATIONS)
         if self.loaded:
             for name in new:
                 if DECLARATIONS[name].at_configure and new[name] != self._values[name]:
@@ -314,7 +315,7 @@ class Guard(ManagedNode):
         return SetParametersResult(successful=True)
 
     def _apply_parameters(self, changed: Sequence[Parameter]) -> None:
-        self._values |= values(changed)
+        self._values |= values_of(changed, DECLARATIONS)
         self._configuration = Configuration.from_values(self._values)
         self._introspect()
 

@@ -1,42 +1,12 @@
 """The parameters of the guard: name, default, range, unit, and whether they can change."""
 
-from collections.abc import Iterable
-from typing import Any, NamedTuple
-
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-from rclpy.exceptions import ParameterException
-from rclpy.node import Node
-from rclpy.parameter import Parameter
-
-from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.ros.declared import Declaration
 from trajectory_guard.settings import LARGEST_LENGTH, Settings, SMALLEST_TOLERANCE
 
 _DEFAULTS = Settings()
 
 # Each takes a thread.
 MOST_REQUESTS = 256
-
-AT_CONFIGURE = 'taken when the guard is configured; cannot change while it is active'
-
-
-class Declaration(NamedTuple):
-    """
-    How one parameter is declared.
-
-    :param default: value if nothing else is said; its type is the parameter's.
-    :param description: what it means, with its unit.
-    :param bounds: least and greatest value of a number; None: the configuration checks it.
-    :param read_only: it cannot change while the node runs.
-    :param at_configure: it says what is loaded when the node is configured, and cannot change
-        while that is in use.
-    """
-
-    default: Any
-    description: str
-    bounds: tuple[float, float] | tuple[int, int] | None = None
-    read_only: bool = False
-    at_configure: bool = False
-
 
 DECLARATIONS = {
     'autostart': Declaration(
@@ -162,54 +132,3 @@ DECLARATIONS = {
         'off', 'what ~/certify/_service_event tells of requests: off, metadata or contents'
     ),
 }
-
-
-def declare(node: Node) -> dict[str, Any]:
-    """
-    Declare all parameters.
-
-    :param node: a node that has none of them yet.
-    :returns: the values by name.
-    :raises RequestError: a value of the wrong type or out of its range, or an unknown name.
-    """
-    try:
-        found = [
-            node.declare_parameter(name, declaration.default, _descriptor(declaration))
-            for name, declaration in DECLARATIONS.items()
-        ]
-    except ParameterException as error:
-        raise RequestError(Reason.INVALID_PARAMETER, str(error)) from error
-    # ROS takes no notice of a name that no node declares: a clearance that is misspelt would be no
-    # clearance. (There is no public way to ask for them.)
-    unknown = [name for name in node._parameter_overrides if not node.has_parameter(name)]
-    if unknown:
-        raise RequestError(
-            Reason.INVALID_PARAMETER,
-            f'the guard has no parameter {", ".join(map(repr, sorted(unknown)))}, '
-            f'but {", ".join(DECLARATIONS)}',
-        )
-    return values(found)
-
-
-def values(parameters: Iterable[Parameter]) -> dict[str, Any]:
-    """Return the values of parameters of the guard by name; those of the node are left out."""
-    return {
-        parameter.name: parameter.value
-        for parameter in parameters
-        if parameter.name in DECLARATIONS
-    }
-
-
-def _descriptor(declaration: Declaration) -> ParameterDescriptor:
-    descriptor = ParameterDescriptor(
-        description=declaration.description,
-        read_only=declaration.read_only,
-        additional_constraints=AT_CONFIGURE if declaration.at_configure else '',
-    )
-    if declaration.bounds is not None:
-        low, high = declaration.bounds
-        if isinstance(declaration.default, int):
-            descriptor.integer_range = [IntegerRange(from_value=low, to_value=high)]
-        else:
-            descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
-    return descriptor

@@ -5,7 +5,7 @@ It needs Linux, and neither rclpy nor launch. That one of the two is gone is no 
 guard the gate is closed, and without a gate nothing reaches the controller.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 import contextlib
 import ctypes
 import os
@@ -14,6 +14,7 @@ import signal
 import subprocess
 import sys
 import time
+from types import MappingProxyType
 from typing import NamedTuple
 
 from ament_index_python import get_package_prefix
@@ -45,11 +46,13 @@ class Program(NamedTuple):
     :param name: what to call it.
     :param command: the executable and its arguments.
     :param meanwhile: what holds as long as it does not run.
+    :param environment: variables that it has besides those of this process.
     """
 
     name: str
     command: Sequence[str | Path]
     meanwhile: str
+    environment: Mapping[str, str] = MappingProxyType({})
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -63,7 +66,7 @@ def main(args: Sequence[str] | None = None) -> int:
     try:
         folder = Path(get_package_prefix(PACKAGE), 'lib', PACKAGE)
         return supervise(
-            Program(name, [folder / name, *arguments], meanwhile)
+            Program(name, [folder / name, *arguments], meanwhile, _enclave(name))
             for name, meanwhile in (
                 ('guard', 'the gate is closed until it is ready'),
                 ('gate', 'no trajectory reaches the controller until it is ready'),
@@ -72,6 +75,13 @@ def main(args: Sequence[str] | None = None) -> int:
     except (TrajectoryGuardError, LookupError) as error:
         _say('FATAL', str(error))
         return BAD_INPUT
+
+
+def _enclave(name: str) -> Mapping[str, str]:
+    """Return the variable that gives a program its own keys, where security is on."""
+    if os.environ.get('ROS_SECURITY_ENABLE') != 'true':
+        return {}
+    return {'ROS_SECURITY_ENCLAVE_OVERRIDE': f'/{PACKAGE}/{name}'}
 
 
 def supervise(programs: Iterable[Program]) -> int:
@@ -127,12 +137,13 @@ class _Child:
         return _LONG if self._process else max(0.0, self._since - time.monotonic())
 
     def _start(self) -> None:
-        name, command, _ = self._program
+        name, command, _, environment = self._program
         self._runs += 1
         try:
             self._process = subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,
+                env=os.environ | environment,
                 # Ctrl-C goes to a whole session: the order of stopping is ours.
                 start_new_session=True,
                 preexec_fn=_bind_to(os.getpid()),
