@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from trajectory_guard.errors import Reason, SceneError
-from trajectory_guard.marker import Key, LISTS, Marker, MarkerKind, refusal, Removal
-from trajectory_guard.marker_scene import MarkerLimits
+from trajectory_guard.markers.marker import Key, LISTS, Marker, MarkerKind, refusal, Removal
+from trajectory_guard.markers.marker_scene import MarkerLimits
 
 # Actions of visualization_msgs/Marker; MODIFY is ADD.
 ADD, DELETE, DELETEALL = 0, 2, 3

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from msg_adapters.marker import ADD, DELETEALL, TEXT_VIEW_FACING
-from trajectory_guard.drawing import Drawing
-from trajectory_guard.marker import MarkerKind
-from trajectory_guard.moments import Moment, Moments
-from trajectory_guard.quaternion import quaternion_of
+from trajectory_guard.cell.quaternion import quaternion_of
+from trajectory_guard.markers.drawing import Drawing
+from trajectory_guard.markers.marker import MarkerKind
+from trajectory_guard.markers.moments import Moment, Moments
 from trajectory_guard.result import NANOSECONDS, Status
 
 NAMESPACE = 'trajectory_guard'

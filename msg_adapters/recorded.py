@@ -15,9 +15,9 @@ from msg_adapters.trajectory import (
     trajectory_from_message,
 )
 from trajectory_guard.errors import Reason, TrajectoryError
-from trajectory_guard.multi_dof import MultiDofTrajectory
+from trajectory_guard.paths.multi_dof import MultiDofTrajectory
+from trajectory_guard.paths.trajectory import JointState, Trajectory
 from trajectory_guard.result import NANOSECONDS
-from trajectory_guard.trajectory import JointState, Trajectory
 
 JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 MULTI_DOF = 'trajectory_msgs/msg/MultiDOFJointTrajectory'

@@ -15,8 +15,8 @@ from msg_adapters.trajectory import (
     trajectory_from_message,
 )
 from trajectory_guard.errors import Reason, TrajectoryError
-from trajectory_guard.multi_dof import MultiDofTrajectory
-from trajectory_guard.trajectory import Trajectory
+from trajectory_guard.paths.multi_dof import MultiDofTrajectory
+from trajectory_guard.paths.trajectory import Trajectory
 
 # Ten thousand points of a seven-joint arm take 5 MB; reading this much takes about a minute.
 MAX_CHARACTERS = 64 * 1024 * 1024

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from trajectory_guard.errors import Reason, TrajectoryError
-from trajectory_guard.multi_dof import MultiDofTrajectory, PosePoint
+from trajectory_guard.paths.multi_dof import MultiDofTrajectory, PosePoint
+from trajectory_guard.paths.trajectory import JointState, Point, Trajectory
 from trajectory_guard.result import NANOSECONDS
-from trajectory_guard.trajectory import JointState, Point, Trajectory
 
 
 def nanoseconds_from_message(duration: Any) -> int:

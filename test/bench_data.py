@@ -4,11 +4,11 @@ import functools
 import json
 from pathlib import Path
 
-from trajectory_guard.scene import load_scene
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.urdf import load_robot
+from trajectory_guard.cell.workcell import Workcell
+from trajectory_guard.paths.trajectory import Point, Trajectory
 from trajectory_guard.settings import Settings
-from trajectory_guard.trajectory import Point, Trajectory
-from trajectory_guard.urdf import load_robot
-from trajectory_guard.workcell import Workcell
 
 BENCH = Path(__file__).parent / 'data' / 'bench'
 ROBOTS = ('panda', 'ur5')

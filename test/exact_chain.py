@@ -10,9 +10,9 @@ from typing import NamedTuple
 from flint import arb, arb_mat, ctx, fmpq, fmpq_mat
 import numpy as np
 
-from trajectory_guard.body import ConvexBody
+from trajectory_guard.cell.pack import boxes, perpendicular, solids
 from trajectory_guard.kernels import layout
-from trajectory_guard.pack import boxes, perpendicular, solids
+from trajectory_guard.shapes.body import ConvexBody
 
 U = 2.0**-53
 ctx.prec = 256

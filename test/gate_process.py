@@ -36,7 +36,7 @@ from trajectory_guard_interfaces.msg import (
 from trajectory_guard_interfaces.srv import CertifyTrajectory
 from trajectory_msgs.msg import JointTrajectory
 
-from trajectory_guard.joint_path import INTERPOLATION
+from trajectory_guard.paths.joint_path import INTERPOLATION
 
 GATE = EXECUTABLE.with_name('gate')
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from trajectory_guard.mesh_formats import Triangles
-from trajectory_guard.scene import load_scene
-from trajectory_guard.trajectory import Point, Trajectory
-from trajectory_guard.urdf import robot_from_urdf
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.urdf import robot_from_urdf
+from trajectory_guard.cell.workcell import Workcell
+from trajectory_guard.paths.trajectory import Point, Trajectory
+from trajectory_guard.shapes.mesh_formats import Triangles
 
 SECOND = 1_000_000_000
 

@@ -6,11 +6,11 @@ import numpy as np
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from trajectory_guard.body import ConvexBody
-from trajectory_guard.joint_path import JointPath
-from trajectory_guard.robot import Collision, Joint, JointType, Loaded, Mimic, Robot
-from trajectory_guard.scene import Obstacle, Scene
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.cell.robot import Collision, Joint, JointType, Loaded, Mimic, Robot
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.workcell import Workcell
+from trajectory_guard.paths.joint_path import JointPath
+from trajectory_guard.shapes.body import ConvexBody
 
 
 class Given:

@@ -5,7 +5,7 @@ from math import comb
 
 import numpy as np
 
-from trajectory_guard.motion import RationalMotion
+from trajectory_guard.motions.motion import RationalMotion
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -11,8 +11,8 @@ import coal
 from coal_judge import shape
 import numpy as np
 
+from trajectory_guard.cell.robot import JointType
 from trajectory_guard.result import Status
-from trajectory_guard.robot import JointType
 
 CHUNK = 1024
 

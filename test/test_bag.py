@@ -23,7 +23,7 @@ from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 from msg_adapters.bag import Bag, is_bag
 from msg_adapters.recorded import JOINT_STATE, JOINT_TRAJECTORY, Recorded, recorded_trajectories
 from trajectory_guard.errors import Reason, TrajectoryError
-from trajectory_guard.trajectory import Trajectory
+from trajectory_guard.paths.trajectory import Trajectory
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 SECOND = 1_000_000_000

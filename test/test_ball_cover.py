@@ -15,7 +15,7 @@ from trajectory_guard.kernels.ball import (
     FACE_VERTEX,
     VERTEX_FACE,
 )
-from trajectory_guard.polyhedron import Polyhedron
+from trajectory_guard.shapes.polyhedron import Polyhedron
 from trajectory_guard.toleranced.face_moments import given_moments
 from trajectory_guard.toleranced.node_metric import node_metric
 from trajectory_guard.toleranced.surface import surface

@@ -10,8 +10,8 @@ from trajectory_guard import certify as certify_module
 from trajectory_guard.batch import judge_all, TOGETHER
 from trajectory_guard.certify import judge
 from trajectory_guard.errors import Reason
+from trajectory_guard.paths.trajectory import JointState
 from trajectory_guard.result import Verdict
-from trajectory_guard.trajectory import JointState
 
 
 def timeless(result):

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.urdf import robot_from_urdf
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge
-from trajectory_guard.joint_path import joint_path
-from trajectory_guard.primitive import Cylinder, Sphere
+from trajectory_guard.paths.joint_path import joint_path
+from trajectory_guard.paths.trajectory import Point, Trajectory
 from trajectory_guard.result import Result, Verdict
-from trajectory_guard.scene import Obstacle, Scene
-from trajectory_guard.trajectory import Point, Trajectory
-from trajectory_guard.urdf import robot_from_urdf
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.shapes.primitive import Cylinder, Sphere
 
 BENCHMARKS = Path(__file__).parent.parent / 'benchmarks'
 sys.path.insert(0, str(BENCHMARKS))

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from trajectory_guard.body import ConvexBody, near_center, rigid_defect, RIGID_TOLERANCE
+from trajectory_guard.shapes.body import ConvexBody, near_center, rigid_defect, RIGID_TOLERANCE
 
 CUBE = np.array(list(product((-0.5, 0.5), repeat=3)))
 CUBE_FACES = np.column_stack((np.concatenate((np.eye(3), -np.eye(3))), np.full(6, 0.5)))

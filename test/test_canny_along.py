@@ -13,9 +13,9 @@ import pytest
 from trajectory_guard.canny.along import _moved, _Scaled, _weight, along
 from trajectory_guard.canny.constraint import Kind
 from trajectory_guard.errors import Reason, RequestError
-from trajectory_guard.joint_path import joint_path
-from trajectory_guard.link_motion import Builder, rational_motion
-from trajectory_guard.motion import RationalMotion
+from trajectory_guard.motions.link_motion import Builder, rational_motion
+from trajectory_guard.motions.motion import RationalMotion
+from trajectory_guard.paths.joint_path import joint_path
 
 KINDS = list(Kind)
 SAMPLES = [Fraction(i, 12) for i in range(13)]

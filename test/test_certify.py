@@ -12,17 +12,17 @@ from random_robot import box_body, far_scene, Given, hull_body, pose, random_bod
 from random_robot import random_robot as make_robot
 
 from trajectory_guard import certify as certify_module
-from trajectory_guard.body import ConvexBody
+from trajectory_guard.cell.robot import Collision, Joint, JointType, Robot
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import certify, judge
 from trajectory_guard.errors import Reason, RequestError, RobotError, SceneError
-from trajectory_guard.joint_path import INTERPOLATION, joint_path
+from trajectory_guard.paths.joint_path import INTERPOLATION, joint_path
+from trajectory_guard.paths.trajectory import JointState, Point, Trajectory
 from trajectory_guard.request import tracking_slack
 from trajectory_guard.result import Status, Verdict
-from trajectory_guard.robot import Collision, Joint, JointType, Robot
-from trajectory_guard.scene import Obstacle, Scene
 from trajectory_guard.settings import Settings
-from trajectory_guard.trajectory import JointState, Point, Trajectory
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.shapes.body import ConvexBody
 
 SECOND = 10**9
 

@@ -20,8 +20,8 @@ from trajectory_guard.command_line.exit_code import exit_code, ExitCode
 from trajectory_guard.command_line.json_lines import JsonLines
 from trajectory_guard.command_line.report import MAX_ROWS, Report
 from trajectory_guard.errors import Reason, TrajectoryGuardError
+from trajectory_guard.paths.trajectory import JointState, Point, Trajectory
 from trajectory_guard.result import Interval, Result, Status, Verdict
-from trajectory_guard.trajectory import JointState, Point, Trajectory
 
 NOTE = 'note: links of the robot are not checked against each other'
 STORE = get_typestore(Stores.ROS2_JAZZY)

@@ -6,10 +6,10 @@ import kernel_calls
 import numpy as np
 import pytest
 
-from trajectory_guard.body import ConvexBody
+from trajectory_guard.cell.pack import solids
 from trajectory_guard.kernels.layout import PARTS, TRIANGLE
-from trajectory_guard.pack import solids
-from trajectory_guard.primitive import Box
+from trajectory_guard.shapes.body import ConvexBody
+from trajectory_guard.shapes.primitive import Box
 
 
 def exact(rows):

@@ -17,10 +17,10 @@ from test_free_certify import path as free_path
 from trajectory_guard.certify import certify, judge
 from trajectory_guard.contact_moment import _first
 from trajectory_guard.errors import Reason, RequestError
-from trajectory_guard.joint_path import joint_path
-from trajectory_guard.primitive import Box, Sphere
+from trajectory_guard.paths.joint_path import joint_path
 from trajectory_guard.result import NANOSECONDS, Status
 from trajectory_guard.settings import Settings
+from trajectory_guard.shapes.primitive import Box, Sphere
 
 CONTACTS = Settings(want_contacts=True)
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from trajectory_guard.containment import may_contain
-from trajectory_guard.mesh_formats import Triangles
+from trajectory_guard.shapes.containment import may_contain
+from trajectory_guard.shapes.mesh_formats import Triangles
 
 
 def winding(mesh, place):

@@ -12,25 +12,25 @@ import pytest
 from rational_curves import random_rigid_motion
 from typer.testing import CliRunner
 
-from trajectory_guard.body import ConvexBody
+from trajectory_guard.cell.free_body import free_body
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.urdf import robot_from_urdf
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import certify, judge
 from trajectory_guard.command_line.app import app
 from trajectory_guard.errors import Reason, RequestError
-from trajectory_guard.facets import faceted, joined
-from trajectory_guard.floating_path import floating_path
-from trajectory_guard.free_body import free_body
-from trajectory_guard.free_path import FreePath
-from trajectory_guard.motion import RationalMotion
-from trajectory_guard.primitive import Box, Cylinder, Sphere
+from trajectory_guard.motions.floating_path import floating_path
+from trajectory_guard.motions.motion import RationalMotion
+from trajectory_guard.paths.free_path import FreePath
+from trajectory_guard.paths.trajectory import JointState, Point, Trajectory
 from trajectory_guard.result import Status, Verdict
-from trajectory_guard.scene import Obstacle, Scene
 from trajectory_guard.settings import Cover, Scope, Settings
-from trajectory_guard.surface import Surface
+from trajectory_guard.shapes.body import ConvexBody
+from trajectory_guard.shapes.facets import faceted, joined
+from trajectory_guard.shapes.primitive import Box, Cylinder, Sphere
+from trajectory_guard.shapes.surface import Surface
 from trajectory_guard.toleranced.collision import collide
 from trajectory_guard.toleranced.pair import pair_of
-from trajectory_guard.trajectory import JointState, Point, Trajectory
-from trajectory_guard.urdf import robot_from_urdf
-from trajectory_guard.workcell import Workcell
 
 SECOND = 10**9
 BALLS = Settings(cover=Cover.BALL, tolerance=1e-3)

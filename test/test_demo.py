@@ -15,6 +15,9 @@ import pytest
 from scipy.interpolate import BPoly
 from typer.testing import CliRunner
 
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.urdf import load_robot
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge
 from trajectory_guard.command_line.app import app
 from trajectory_guard.demo.case import CASES, FINGERS, SCENE
@@ -23,12 +26,9 @@ from trajectory_guard.demo.files import CHECKOUT, config_file, panda_urdf
 from trajectory_guard.demo.next_steps import next_steps
 from trajectory_guard.demo.poses import PoseChecker, positions, sample_times, waypoint_times
 from trajectory_guard.errors import Reason, TrajectoryError
+from trajectory_guard.paths.trajectory import JointState
 from trajectory_guard.result import NANOSECONDS, Result, Status, Verdict
-from trajectory_guard.scene import load_scene
 from trajectory_guard.settings import Settings
-from trajectory_guard.trajectory import JointState
-from trajectory_guard.urdf import load_robot
-from trajectory_guard.workcell import Workcell
 
 STEP = 0.05
 DENSE = 400

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from trajectory_guard.certify import judge
-from trajectory_guard.joint_path import joint_path
 from trajectory_guard.kernels import compiled
 from trajectory_guard.kernels import cover as cover_module
+from trajectory_guard.paths.joint_path import joint_path
 from trajectory_guard.request import motion_path
 from trajectory_guard.settings import Scope
 

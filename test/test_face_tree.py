@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pytest
 
-from trajectory_guard.face_tree import face_tree
-from trajectory_guard.polyhedron import Polyhedron
+from trajectory_guard.shapes.face_tree import face_tree
+from trajectory_guard.shapes.polyhedron import Polyhedron
 
 
 def grid(n):

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from rational_curves import exact_image, random_rigid_motion
 
+from trajectory_guard.cell.free_body import free_body
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.errors import Reason, RequestError
-from trajectory_guard.floating import floating, stretch
-from trajectory_guard.floating_path import floating_path
-from trajectory_guard.free_body import free_body
-from trajectory_guard.free_path import FreePath
 from trajectory_guard.kernels.cover import cover
 from trajectory_guard.kernels.layout import KernelRefused
-from trajectory_guard.link_motion import Builder, rational_motion
-from trajectory_guard.motion import RationalMotion
-from trajectory_guard.primitive import Box
+from trajectory_guard.motions.floating import floating, stretch
+from trajectory_guard.motions.floating_path import floating_path
+from trajectory_guard.motions.link_motion import Builder, rational_motion
+from trajectory_guard.motions.motion import RationalMotion
+from trajectory_guard.paths.free_path import FreePath
 from trajectory_guard.request import motion_path
-from trajectory_guard.scene import Obstacle, Scene
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.shapes.primitive import Box
 
 SECOND = 10**9
 

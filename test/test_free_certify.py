@@ -5,19 +5,19 @@ import numpy as np
 import pytest
 from rational_curves import random_rigid_motion
 
+from trajectory_guard.cell.free_body import free_body
+from trajectory_guard.cell.robot import Shape
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.urdf import robot_from_urdf
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import certify
 from trajectory_guard.errors import Reason, TrajectoryError, TrajectoryGuardError
-from trajectory_guard.free_body import free_body
-from trajectory_guard.free_path import FreePath
-from trajectory_guard.joint_path import JointPath
-from trajectory_guard.motion import RationalMotion
-from trajectory_guard.primitive import Box, Cylinder, Sphere
+from trajectory_guard.motions.motion import RationalMotion
+from trajectory_guard.paths.free_path import FreePath
+from trajectory_guard.paths.joint_path import JointPath
 from trajectory_guard.result import Status, Verdict
-from trajectory_guard.robot import Shape
-from trajectory_guard.scene import Obstacle, Scene
 from trajectory_guard.settings import Settings
-from trajectory_guard.urdf import robot_from_urdf
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.shapes.primitive import Box, Cylinder, Sphere
 
 SECOND = 10**9
 SHAPES = [Box((0.3, 0.2, 0.1)), Sphere(0.1), Cylinder(0.05, 0.4)]
@@ -172,8 +172,8 @@ ROBOT = """<robot name="r"><link name="map"/><link name="cart"><collision><geome
 
 def test_a_link_beyond_a_moving_base_is_checked_too() -> None:
     """The tip, 0.5 m ahead of the cart and turned with it, is what hits."""
-    from trajectory_guard.floating_path import floating_path
-    from trajectory_guard.trajectory import JointState
+    from trajectory_guard.motions.floating_path import floating_path
+    from trajectory_guard.paths.trajectory import JointState
 
     robot = robot_from_urdf(ROBOT)
     assert robot.floating == 'drive'

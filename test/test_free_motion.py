@@ -9,26 +9,26 @@ from rational_curves import exact_pose
 from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
+from trajectory_guard.cell.free_body import free_body
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import certify
 from trajectory_guard.errors import Reason, RequestError
-from trajectory_guard.free_body import free_body
-from trajectory_guard.free_motion.keyframes import through_poses
-from trajectory_guard.free_motion.quaternion_curve import (
+from trajectory_guard.paths.free_motion.keyframes import through_poses
+from trajectory_guard.paths.free_motion.quaternion_curve import (
     dual_quaternion_motion,
     Rigid,
     rigid_motion,
 )
-from trajectory_guard.free_motion.spline import (
+from trajectory_guard.paths.free_motion.spline import (
     bezier_pieces,
     displacement_spline,
     dual_quaternion_spline,
     rigid_spline,
 )
-from trajectory_guard.free_motion.turn import constant_turn
-from trajectory_guard.primitive import Box
+from trajectory_guard.paths.free_motion.turn import constant_turn
 from trajectory_guard.result import Status
-from trajectory_guard.scene import Obstacle, Scene
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.shapes.primitive import Box
 
 SECOND = 10**9
 INSTANTS = [Fraction(k, 7) for k in range(8)] + [Fraction(1, 1000)]

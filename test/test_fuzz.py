@@ -33,6 +33,9 @@ from sweep import Sweep
 from trajectory_guard_interfaces.srv import CertifyTrajectory
 
 from msg_adapters.result import result_from_message, result_to_message
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.urdf import robot_from_urdf
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certificate import text
 from trajectory_guard.certify import judge
 from trajectory_guard.errors import Reason, TrajectoryGuardError
@@ -40,9 +43,6 @@ from trajectory_guard.result import Result, Status, Verdict
 from trajectory_guard.ros.configuration import Configuration
 from trajectory_guard.ros.parameters import DECLARATIONS
 from trajectory_guard.ros.question import question_from_request
-from trajectory_guard.scene import load_scene
-from trajectory_guard.urdf import robot_from_urdf
-from trajectory_guard.workcell import Workcell
 
 # What the guard is told; small, so that no request takes long.
 TOLD = {'clearance': 0.002, 'tracking_tolerance': [0.0005], 'max_points': 64, 'max_joints': 16}

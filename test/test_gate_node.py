@@ -34,18 +34,18 @@ from msg_adapters.trajectory import (
     stamp_from_message,
     trajectory_from_message,
 )
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.urdf import load_robot
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge
-from trajectory_guard.entry import Measured
 from trajectory_guard.errors import Reason
+from trajectory_guard.paths.entry import Measured
+from trajectory_guard.paths.takeover import takeover
 from trajectory_guard.result import Verdict
 from trajectory_guard.ros.gate_configuration import GateConfiguration
 from trajectory_guard.ros.gate_parameters import DECLARATIONS
 from trajectory_guard.ros.gate_request import request_for
-from trajectory_guard.scene import load_scene
 from trajectory_guard.settings import Settings
-from trajectory_guard.takeover import takeover
-from trajectory_guard.urdf import load_robot
-from trajectory_guard.workcell import Workcell
 
 FREE = message((0.0, [0.0, 0.0]), (1.0, [0.5, 0.5]))
 HIT = message((0.0, [0.0, 0.0]), (1.0, [1.9, 0.0]))

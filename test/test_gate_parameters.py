@@ -207,8 +207,8 @@ def rows() -> dict[str, str]:
 def test_every_code_of_the_gate_is_in_the_table() -> None:
     sources = [
         *ROOT.glob('trajectory_guard/ros/gate*.py'),
-        ROOT / 'trajectory_guard/entry.py',
-        ROOT / 'trajectory_guard/takeover.py',
+        ROOT / 'trajectory_guard/paths/entry.py',
+        ROOT / 'trajectory_guard/paths/takeover.py',
     ]
     used = {
         name for path in sources for name in re.findall(r'Reason\.([A-Z_]+)', path.read_text())

@@ -11,7 +11,7 @@ from random_robot import box_body, hull_body
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from trajectory_guard.pack import solids
+from trajectory_guard.cell.pack import solids
 
 
 def hull_of(body):

@@ -38,6 +38,9 @@ from trajectory_msgs.msg import JointTrajectory
 
 from msg_adapters.result import result_from_message
 from msg_adapters.trajectory import joint_state_from_message, trajectory_from_message
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.urdf import load_robot
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certificate import text
 from trajectory_guard.certify import judge
 from trajectory_guard.demo.files import panda_urdf
@@ -45,10 +48,7 @@ from trajectory_guard.errors import Reason
 from trajectory_guard.result import Result, Verdict
 from trajectory_guard.ros.guard import main
 from trajectory_guard.ros.guard_node import Guard
-from trajectory_guard.scene import load_scene
 from trajectory_guard.settings import Settings
-from trajectory_guard.urdf import load_robot
-from trajectory_guard.workcell import Workcell
 
 # What the guard under test is told; nothing less may be asked of it.
 MINIMUM = Settings(clearance=0.002, tracking_tolerance=(0.001,))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BPoly, CubicHermiteSpline
 
-from trajectory_guard.hermite import degrees, hermite, Knots
+from trajectory_guard.paths.hermite import degrees, hermite, Knots
 
 # Velocities and accelerations present at the knot.
 P, V, A = (False, False), (True, False), (True, True)

@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
-from trajectory_guard import hull as module
-from trajectory_guard.hull import convex_hull, distance_bound
+from trajectory_guard.shapes import hull as module
+from trajectory_guard.shapes.hull import convex_hull, distance_bound
 
 RNG = np.random.default_rng(7)
 BALL = RNG.normal(size=(300, 3))

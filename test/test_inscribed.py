@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from trajectory_guard.hull import convex_hull
-from trajectory_guard.inscribed import inscribed_polytope, is_closed, winding_number
+from trajectory_guard.shapes.hull import convex_hull
+from trajectory_guard.shapes.inscribed import inscribed_polytope, is_closed, winding_number
 
 TURN = trimesh.transformations.random_rotation_matrix(np.array([0.1, 0.6, 0.9]))
 

@@ -19,13 +19,13 @@ from guard_process import ARM, DOMAIN, guard_process, GuardProcess, parameters, 
 import pytest
 
 from msg_adapters.result import result_from_message
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.urdf import robot_from_urdf
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge
+from trajectory_guard.paths.trajectory import Point, Trajectory
 from trajectory_guard.result import Result, Status, Verdict
-from trajectory_guard.scene import load_scene
 from trajectory_guard.settings import Settings
-from trajectory_guard.trajectory import Point, Trajectory
-from trajectory_guard.urdf import robot_from_urdf
-from trajectory_guard.workcell import Workcell
 
 pytestmark = pytest.mark.skipif(
     find_spec('cyclonedds') is None, reason='needs another DDS (pip install cyclonedds)'

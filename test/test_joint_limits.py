@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from trajectory_guard.joint_limits import limit_excess
+from trajectory_guard.paths.joint_limits import limit_excess
 
 
 def excess(curve, lower=-math.inf, upper=math.inf, tolerance=0.0, error=0.0):

@@ -8,10 +8,10 @@ import math
 import numpy as np
 import pytest
 
+from trajectory_guard.cell.robot import Joint, JointType, Mimic
 from trajectory_guard.errors import Reason, RequestError, TrajectoryError, TrajectoryGuardError
-from trajectory_guard.joint_path import joint_path, JointPath
-from trajectory_guard.robot import Joint, JointType, Mimic
-from trajectory_guard.trajectory import JointState, Point, Trajectory
+from trajectory_guard.paths.joint_path import joint_path, JointPath
+from trajectory_guard.paths.trajectory import JointState, Point, Trajectory
 
 SECOND = 10**9
 TURN = 2 * math.pi

@@ -4,18 +4,18 @@ from meshes import extruded, U
 import numpy as np
 import pytest
 
+from trajectory_guard.cell.free_body import free_body
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import certify
-from trajectory_guard.free_body import free_body
-from trajectory_guard.free_path import FreePath
-from trajectory_guard.jumps import jumps
 from trajectory_guard.kernels.layout import Floating, Path
-from trajectory_guard.mesh import mesh_body
-from trajectory_guard.motion import RationalMotion
-from trajectory_guard.primitive import Box
+from trajectory_guard.motions.motion import RationalMotion
+from trajectory_guard.paths.free_path import FreePath
+from trajectory_guard.paths.jumps import jumps
 from trajectory_guard.result import Status
-from trajectory_guard.scene import Obstacle, Scene
 from trajectory_guard.settings import Scope, Settings
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.shapes.mesh import mesh_body
+from trajectory_guard.shapes.primitive import Box
 
 SECOND = 10**9
 OPENING, WALL, BEHIND = (0.0, 0.05, 0.0), (-0.15, 0.0, 0.0), (0.02, 0.05, 0.0)

@@ -7,8 +7,8 @@ import pytest
 from random_robot import core, link_poses, random_path, random_workcell
 
 from trajectory_guard.errors import RequestError
-from trajectory_guard.joint_path import joint_path
-from trajectory_guard.link_motion import Builder, rational_motion
+from trajectory_guard.motions.link_motion import Builder, rational_motion
+from trajectory_guard.paths.joint_path import joint_path
 
 # scipy's and pinocchio's own rounding, next to metres.
 JUDGE = 1e-14

@@ -9,9 +9,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from msg_adapters.marker import added_keys, changes_from_message
 from trajectory_guard.errors import Reason, TrajectoryGuardError
-from trajectory_guard.live_markers import LiveMarkers
-from trajectory_guard.marker import Key
-from trajectory_guard.marker_scene import MarkerLimits
+from trajectory_guard.markers.live_markers import LiveMarkers
+from trajectory_guard.markers.marker import Key
+from trajectory_guard.markers.marker_scene import MarkerLimits
 
 FRAMES = {BASE: ()}
 LIMITS = MarkerLimits(markers=6, points=20)

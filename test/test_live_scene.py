@@ -12,14 +12,14 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from visualization_msgs.msg import Marker, MarkerArray
 
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.urdf import robot_from_urdf
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge
 from trajectory_guard.errors import Reason
+from trajectory_guard.paths.trajectory import Point, Trajectory
 from trajectory_guard.ros.live_scene import LiveScene, MARKERS
 from trajectory_guard.ros.moments import LATCHED, MomentsPublisher
-from trajectory_guard.scene import load_scene
-from trajectory_guard.trajectory import Point, Trajectory
-from trajectory_guard.urdf import robot_from_urdf
-from trajectory_guard.workcell import Workcell
 
 FRAMES = {BASE: ()}
 

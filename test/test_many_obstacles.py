@@ -9,17 +9,17 @@ import pytest
 from random_robot import box_body, hull_body, link_poses, pose, random_body
 from scipy.spatial.transform import Rotation
 
-from trajectory_guard.body import ConvexBody
+from trajectory_guard.cell.pack import boxes, solids
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import certify
-from trajectory_guard.joint_path import joint_path
 from trajectory_guard.kernels import layout
 from trajectory_guard.kernels.cover import cover
 from trajectory_guard.kernels.link_motion import link_motion
-from trajectory_guard.pack import boxes, solids
+from trajectory_guard.paths.joint_path import joint_path
 from trajectory_guard.request import motion_path
-from trajectory_guard.scene import Obstacle, Scene
 from trajectory_guard.settings import Scope
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.shapes.body import ConvexBody
 
 COUNT = 3000
 CLEARANCE = 0.003

@@ -26,11 +26,11 @@ import pytest
 from random_robot import random_path, random_workcell
 from scipy.spatial.transform import Rotation
 
-from trajectory_guard.body import ConvexBody
+from trajectory_guard.cell.pack import solids
+from trajectory_guard.cell.robot import JointType
 from trajectory_guard.kernels import layout
-from trajectory_guard.link_motion import Builder, rational_motion
-from trajectory_guard.pack import solids
-from trajectory_guard.robot import JointType
+from trajectory_guard.motions.link_motion import Builder, rational_motion
+from trajectory_guard.shapes.body import ConvexBody
 
 SCALES = [1e-6, 1.0, 1e6]
 TAUS = [fmpq(0), fmpq(-1), fmpq(1), fmpq(3, 7), fmpq(-5, 11)]

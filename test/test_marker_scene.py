@@ -15,16 +15,21 @@ from test_quaternion import exact_rotation
 from visualization_msgs.msg import Marker
 
 from msg_adapters.marker import changes_from_message
+from trajectory_guard.cell.pack import solids
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.urdf import load_robot, robot_from_urdf
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge
 from trajectory_guard.errors import Reason, SceneError
-from trajectory_guard.marker import MarkerKind
-from trajectory_guard.marker_scene import fixed_frames, MarkerLimits, MarkerScene, with_markers
-from trajectory_guard.pack import solids
-from trajectory_guard.primitive import Box
+from trajectory_guard.markers.marker import MarkerKind
+from trajectory_guard.markers.marker_scene import (
+    fixed_frames,
+    MarkerLimits,
+    MarkerScene,
+    with_markers,
+)
 from trajectory_guard.result import Status
-from trajectory_guard.scene import Obstacle, Scene
-from trajectory_guard.urdf import load_robot, robot_from_urdf
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.shapes.primitive import Box
 
 FRAMES = {BASE: ()}
 PLACES = [(0.0, 0.0, 0.0), (1.0, 2.0, -3.0), (-0.1, 0.2, 0.5)]

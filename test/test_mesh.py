@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from trajectory_guard.body import ConvexBody
 from trajectory_guard.errors import Reason, RobotError
-from trajectory_guard.mesh import mesh_body, MeshFile
-from trajectory_guard.mesh_formats import Triangles
+from trajectory_guard.shapes.body import ConvexBody
+from trajectory_guard.shapes.mesh import mesh_body, MeshFile
+from trajectory_guard.shapes.mesh_formats import Triangles
 
 ONE = (1.0, 1.0, 1.0)
 KNOT = trimesh.creation.torus(major_radius=0.4, minor_radius=0.1).apply_translation((0.1, 0, 3))

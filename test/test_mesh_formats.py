@@ -8,8 +8,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from trajectory_guard.mesh_formats import read_collada, read_obj, read_ply, read_stl, READERS
-from trajectory_guard.mesh_formats.triangles import fans, Triangles
+from trajectory_guard.shapes.mesh_formats import (
+    read_collada,
+    read_obj,
+    read_ply,
+    read_stl,
+    READERS,
+)
+from trajectory_guard.shapes.mesh_formats.triangles import fans, Triangles
 
 Reader = Callable[[bytes], Triangles]
 SPHERE = trimesh.creation.icosphere(subdivisions=1)

@@ -5,9 +5,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from trajectory_guard.cell.robot import Joint, JointType, Mimic
 from trajectory_guard.errors import Reason, RobotError
-from trajectory_guard.mimic import follow, followers
-from trajectory_guard.robot import Joint, JointType, Mimic
+from trajectory_guard.paths.mimic import follow, followers
 
 
 def joint(name, mimic=None):

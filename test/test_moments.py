@@ -14,19 +14,19 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from msg_adapters.marker import changes_from_message
 from msg_adapters.moment_markers import moments_to_message
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.urdf import load_robot, robot_from_urdf
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge
-from trajectory_guard.drawing import link_drawings, MOST_TRIANGLES
 from trajectory_guard.errors import Reason, RequestError
-from trajectory_guard.link_pose import link_pose
-from trajectory_guard.marker import MarkerKind
-from trajectory_guard.marker_scene import MarkerScene
-from trajectory_guard.moments import Moment, Moments, moments
+from trajectory_guard.markers.drawing import link_drawings, MOST_TRIANGLES
+from trajectory_guard.markers.link_pose import link_pose
+from trajectory_guard.markers.marker import MarkerKind
+from trajectory_guard.markers.marker_scene import MarkerScene
+from trajectory_guard.markers.moments import Moment, Moments, moments
+from trajectory_guard.paths.trajectory import JointState, Point, Trajectory
 from trajectory_guard.result import Interval, Result, Status
-from trajectory_guard.scene import load_scene
 from trajectory_guard.settings import Settings
-from trajectory_guard.trajectory import JointState, Point, Trajectory
-from trajectory_guard.urdf import load_robot, robot_from_urdf
-from trajectory_guard.workcell import Workcell
 
 STAMP = Time(sec=7, nanosec=8)
 

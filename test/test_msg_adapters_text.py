@@ -15,7 +15,7 @@ from msg_adapters import strict_yaml
 from msg_adapters import text as text_module
 from msg_adapters.text import documents, trajectories_from_text
 from trajectory_guard.errors import Reason, TrajectoryError
-from trajectory_guard.trajectory import Trajectory
+from trajectory_guard.paths.trajectory import Trajectory
 
 # As printed by `ros2 topic echo`, with some numbers in the forms that people write.
 ECHOED = """\

@@ -14,18 +14,18 @@ from typer.testing import CliRunner
 
 from msg_adapters.text import documents
 from msg_adapters.trajectory import multi_dof_from_message
+from trajectory_guard.cell.free_body import free_body
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.urdf import robot_from_urdf
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge
 from trajectory_guard.command_line.app import app
 from trajectory_guard.errors import Reason, TrajectoryError
-from trajectory_guard.free_body import free_body
-from trajectory_guard.multi_dof import MultiDofTrajectory, PosePoint
-from trajectory_guard.multi_dof_path import INTERPOLATION, multi_dof_path
-from trajectory_guard.primitive import Box
+from trajectory_guard.paths.multi_dof import MultiDofTrajectory, PosePoint
+from trajectory_guard.paths.multi_dof_path import INTERPOLATION, multi_dof_path
 from trajectory_guard.result import Status, Verdict
-from trajectory_guard.scene import Obstacle, Scene
 from trajectory_guard.settings import Settings
-from trajectory_guard.urdf import robot_from_urdf
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.shapes.primitive import Box
 
 SECOND = 10**9
 LEVEL = (0.0, 0.0, 0.0, 1.0)

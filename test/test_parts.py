@@ -9,8 +9,6 @@ import pytest
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from trajectory_guard import parts
-from trajectory_guard.body import rigid_defect, RIGID_TOLERANCE, U
 from trajectory_guard.kernels.layout import (
     BALL,
     BOX,
@@ -26,10 +24,12 @@ from trajectory_guard.kernels.layout import (
     TRIANGLE,
     UNBUILT,
 )
-from trajectory_guard.mesh import mesh_body
-from trajectory_guard.mesh_formats import Triangles
-from trajectory_guard.parts import Clusters
-from trajectory_guard.surface import Surface
+from trajectory_guard.shapes import parts
+from trajectory_guard.shapes.body import rigid_defect, RIGID_TOLERANCE, U
+from trajectory_guard.shapes.mesh import mesh_body
+from trajectory_guard.shapes.mesh_formats import Triangles
+from trajectory_guard.shapes.parts import Clusters
+from trajectory_guard.shapes.surface import Surface
 
 
 def moved(mesh, seed=0):

@@ -20,7 +20,7 @@ from drawing import fat_polygon, shrinking_cover, squares  # noqa: E402
 from drawing.arcs import arcs  # noqa: E402
 from drawing.palette import OPEN  # noqa: E402
 
-from trajectory_guard.link_motion import rational_motion  # noqa: E402
+from trajectory_guard.motions.link_motion import rational_motion  # noqa: E402
 from trajectory_guard.toleranced.minimum_ellipsoid import least_distortion  # noqa: E402
 from trajectory_guard.toleranced.patches import Patch  # noqa: E402
 

@@ -7,13 +7,13 @@ import pytest
 from random_robot import box_body, Given, link_poses, pose
 from scipy.spatial.transform import Rotation
 
-from trajectory_guard.body import ConvexBody
+from trajectory_guard.cell.robot import Collision, Joint, JointType, Robot
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.kernels import layout
 from trajectory_guard.kernels.cover import cover, Covered
-from trajectory_guard.robot import Collision, Joint, JointType, Robot
-from trajectory_guard.scene import Obstacle, Scene
 from trajectory_guard.settings import Scope
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.shapes.body import ConvexBody
 
 PARTS = ('chain', 'links', 'obstacles', 'boxes', 'extents')
 # Lengths are never negative, so only a NaN or a large one is nonsense that can come.

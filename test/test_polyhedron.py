@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trajectory_guard.polyhedron import Polyhedron
+from trajectory_guard.shapes.polyhedron import Polyhedron
 
 CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
 SIDES = (

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial import HalfspaceIntersection
 
-from trajectory_guard.body import ConvexBody
 from trajectory_guard.errors import Reason, RobotError
-from trajectory_guard.primitive import Box, Cylinder, Sphere, sphere_directions
+from trajectory_guard.shapes.body import ConvexBody
+from trajectory_guard.shapes.primitive import Box, Cylinder, Sphere, sphere_directions
 
 SHAPES = [
     Box((0.2, 3.0, 0.01)),

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from trajectory_guard.body import rigid_defect, RIGID_TOLERANCE, U
-from trajectory_guard.quaternion import quaternion_length, quaternion_of, quaternion_pose
+from trajectory_guard.cell.quaternion import quaternion_length, quaternion_of, quaternion_pose
+from trajectory_guard.shapes.body import rigid_defect, RIGID_TOLERANCE, U
 
 BOUND = 10 * Fraction(U)
 

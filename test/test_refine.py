@@ -24,14 +24,14 @@ import pytest
 from random_robot import link_poses
 from scipy.spatial.transform import Rotation
 
-from trajectory_guard import parts
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge
-from trajectory_guard.joint_path import joint_path
-from trajectory_guard.mesh_formats import Triangles
+from trajectory_guard.paths.joint_path import joint_path
 from trajectory_guard.result import Status, Verdict
-from trajectory_guard.scene import load_scene
 from trajectory_guard.settings import Scope, Settings
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.shapes import parts
+from trajectory_guard.shapes.mesh_formats import Triangles
 
 PEG = box_tool(0.15, 0.15, 0.05)
 PEBBLE = box_tool(0.02, 0.02, 0.02)

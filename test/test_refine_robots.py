@@ -8,15 +8,15 @@ from random_robot import link_poses, pose
 from test_refine import bvh
 from test_robot import ROBOTS
 
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.urdf import load_robot
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge
-from trajectory_guard.joint_path import joint_path
-from trajectory_guard.primitive import Box
+from trajectory_guard.paths.joint_path import joint_path
+from trajectory_guard.paths.trajectory import Point, Trajectory
 from trajectory_guard.result import Status, Verdict
-from trajectory_guard.scene import Obstacle, Scene
 from trajectory_guard.settings import Settings
-from trajectory_guard.trajectory import Point, Trajectory
-from trajectory_guard.urdf import load_robot
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.shapes.primitive import Box
 
 
 def ride(robot, rng):

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.urdf import load_robot
 from trajectory_guard.errors import Reason, RobotError, SceneError
-from trajectory_guard.resource import MeshLimits, places
-from trajectory_guard.scene import load_scene
-from trajectory_guard.urdf import load_robot
+from trajectory_guard.shapes.resource import MeshLimits, places
 
 FOLDER = Path('/robots/arm_description/urdf')
 

@@ -9,10 +9,10 @@ import pinocchio
 import pytest
 import trimesh
 
+from trajectory_guard.cell.robot import JointType, Robot
+from trajectory_guard.cell.urdf import load_robot, robot_from_urdf
 from trajectory_guard.errors import Reason, RobotError
-from trajectory_guard.mesh import MeshFile
-from trajectory_guard.robot import JointType, Robot
-from trajectory_guard.urdf import load_robot, robot_from_urdf
+from trajectory_guard.shapes.mesh import MeshFile
 
 PREFIX = 'cmeel.prefix/share/example-robot-data/robots'
 ROBOTS = Path(str(distribution('example-robot-data').locate_file(PREFIX)))

@@ -11,12 +11,12 @@ from rational_curves import random_rigid_motion
 from test_free_certify import cell as free_cell
 from test_free_certify import path as free_path
 
-from trajectory_guard.body import ConvexBody
+from trajectory_guard.cell.pack import solids
 from trajectory_guard.certify import certify
-from trajectory_guard.pack import solids
-from trajectory_guard.primitive import Box, Cylinder, Sphere
 from trajectory_guard.result import NANOSECONDS, Status
 from trajectory_guard.settings import Settings
+from trajectory_guard.shapes.body import ConvexBody
+from trajectory_guard.shapes.primitive import Box, Cylinder, Sphere
 
 getcontext().prec = 60
 

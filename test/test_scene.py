@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from trajectory_guard.cell.scene import load_scene, Scene
 from trajectory_guard.errors import Reason, SceneError
-from trajectory_guard.scene import load_scene, Scene
 
 BOX = '<collision><origin xyz="0 0 1"/><geometry><box size="2 2 2"/></geometry></collision>'
 MESH = '<collision><geometry><mesh filename="{}"/></geometry></collision>'

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from random_robot import box_body, core, hull_body, random_body
 
+from trajectory_guard.cell.pack import solids
 from trajectory_guard.kernels.layout import CORE, FAR, FIRST, LANES, LAST
-from trajectory_guard.pack import solids
 
 
 def controls(rng, count, scale=1.0, spread=0.3):
@@ -174,7 +174,7 @@ def test_the_box_of_a_turned_box_is_tight():
 @pytest.mark.parametrize('radius', [1e-6, 1.0, 1e5])
 def test_the_box_contains_a_disc_that_is_almost_aligned(tilt, radius):
     """Found in review: 1 - (r.a)^2 cancels, and the box lost R times the tilt."""
-    from trajectory_guard.body import ConvexBody
+    from trajectory_guard.shapes.body import ConvexBody
 
     axis = np.array([math.sin(tilt), 0.0, math.cos(tilt)])
     body = ConvexBody(np.zeros((1, 3)), disc_radius=radius, disc_axis=axis)

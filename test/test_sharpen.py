@@ -17,10 +17,10 @@ from test_free_certify import path as free_path
 
 from trajectory_guard.certify import certify, judge
 from trajectory_guard.errors import Reason
-from trajectory_guard.joint_path import joint_path
-from trajectory_guard.primitive import Box
+from trajectory_guard.paths.joint_path import joint_path
 from trajectory_guard.result import Status, Verdict
 from trajectory_guard.settings import Scope, Settings
+from trajectory_guard.shapes.primitive import Box
 
 SECOND = 10**9
 

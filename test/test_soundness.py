@@ -18,11 +18,11 @@ from random_robot import link_poses, random_path, random_robot
 from sweep import Counts, Sweep, swept
 from test_certify import random_scene
 
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import certify
-from trajectory_guard.joint_path import joint_path
+from trajectory_guard.paths.joint_path import joint_path
 from trajectory_guard.request import tracking_slack
 from trajectory_guard.settings import Settings
-from trajectory_guard.workcell import Workcell
 
 SAMPLES = 100_000
 MANY = int(float(os.environ.get('TRAJECTORY_GUARD_SWEEP', '1e7')))

@@ -6,11 +6,11 @@ import math
 import numpy as np
 import pytest
 
+from trajectory_guard.cell.robot import Joint, JointType
 from trajectory_guard.errors import Reason, TrajectoryError
-from trajectory_guard.hermite import Knots
-from trajectory_guard.robot import Joint, JointType
-from trajectory_guard.start_state import with_start
-from trajectory_guard.trajectory import JointState
+from trajectory_guard.paths.hermite import Knots
+from trajectory_guard.paths.start_state import with_start
+from trajectory_guard.paths.trajectory import JointState
 
 # More digits of 2 pi than a float has.
 TURN = Fraction(6283185307179586476925286766559005768394338798750, 10**48)

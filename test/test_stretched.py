@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from trajectory_guard.stretched import ellipsoid, elliptic_cylinder
+from trajectory_guard.shapes.stretched import ellipsoid, elliptic_cylinder
 
 SIZES = [(1.0, 1.0, 1.0), (0.2, 0.5, 3.0), (1e-3, 1.0, 2.0), (1e-6, 1e-6, 5e-7), (1e3, 2e3, 1e3)]
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from trajectory_guard.mesh import mesh_body
-from trajectory_guard.mesh_formats import Triangles
-from trajectory_guard.surface import Surface
+from trajectory_guard.shapes.mesh import mesh_body
+from trajectory_guard.shapes.mesh_formats import Triangles
+from trajectory_guard.shapes.surface import Surface
 
 
 def surface(mesh):

@@ -11,13 +11,13 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from msg_adapters.result import nanoseconds_to_message
 from msg_adapters.trajectory import joint_state_from_message, trajectory_from_message
-from trajectory_guard.entry import Allowance, Entry, Measured
+from trajectory_guard.cell.urdf import robot_from_urdf
 from trajectory_guard.errors import Reason, TrajectoryError
-from trajectory_guard.joint_path import joint_path, JointPath
-from trajectory_guard.near_path import farthest
+from trajectory_guard.paths.entry import Allowance, Entry, Measured
+from trajectory_guard.paths.joint_path import joint_path, JointPath
+from trajectory_guard.paths.near_path import farthest
+from trajectory_guard.paths.takeover import Takeover, takeover
 from trajectory_guard.ros.gate_request import request_for
-from trajectory_guard.takeover import Takeover, takeover
-from trajectory_guard.urdf import robot_from_urdf
 
 NOW_NS = 1_700_000_000 * 10**9
 SECOND = 10**9

@@ -9,7 +9,7 @@ import pytest
 from rational_curves import random_curve, rational_curve
 
 from trajectory_guard.errors import RequestError
-from trajectory_guard.polyhedron import Polyhedron
+from trajectory_guard.shapes.polyhedron import Polyhedron
 from trajectory_guard.toleranced.collision import collide, collisions
 from trajectory_guard.toleranced.pair import pair_of
 from trajectory_guard.toleranced.suspect import Kind, Why

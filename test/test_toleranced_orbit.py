@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from trajectory_guard.errors import RequestError
-from trajectory_guard.inscribed import is_closed
+from trajectory_guard.shapes.inscribed import is_closed
 from trajectory_guard.toleranced.affine import Affine
 from trajectory_guard.toleranced.displacement_ball import DisplacementBall
 from trajectory_guard.toleranced.distance import largest_accepted

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from trajectory_guard.errors import Reason, TrajectoryError
-from trajectory_guard.trajectory import JointState, Point, Trajectory
+from trajectory_guard.paths.trajectory import JointState, Point, Trajectory
 
 NAMES = ('a', 'b')
 SECOND = 10**9

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trajectory_guard.unique_rows import unique_rows
+from trajectory_guard.shapes.unique_rows import unique_rows
 
 
 @pytest.mark.parametrize('count', [1, 2, 50, 3000])

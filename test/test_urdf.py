@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from trajectory_guard.cell.robot import JointType, Mimic, Robot
+from trajectory_guard.cell.urdf import load_robot, robot_from_urdf
 from trajectory_guard.errors import Reason, RobotError
-from trajectory_guard.mesh import MeshFile
-from trajectory_guard.primitive import Box, Cylinder, Sphere
-from trajectory_guard.robot import JointType, Mimic, Robot
-from trajectory_guard.urdf import load_robot, robot_from_urdf
+from trajectory_guard.shapes.mesh import MeshFile
+from trajectory_guard.shapes.primitive import Box, Cylinder, Sphere
 
 SOLID = '<collision><geometry><box size="1 2 3"/></geometry></collision>'
 

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from random_robot import box_body, Given, pose, random_body, random_robot
 
+from trajectory_guard.cell.robot import Collision, Joint, JointType, Robot
+from trajectory_guard.cell.scene import load_scene, Obstacle, Scene
+from trajectory_guard.cell.urdf import load_robot
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge
 from trajectory_guard.errors import Reason, TrajectoryGuardError
-from trajectory_guard.joint_path import joint_path
-from trajectory_guard.robot import Collision, Joint, JointType, Robot
-from trajectory_guard.scene import load_scene, Obstacle, Scene
+from trajectory_guard.paths.joint_path import joint_path
+from trajectory_guard.paths.trajectory import JointState, Point, Trajectory
 from trajectory_guard.settings import Settings
-from trajectory_guard.trajectory import JointState, Point, Trajectory
-from trajectory_guard.urdf import load_robot
 from trajectory_guard.verify import verify
 from trajectory_guard.verify.document import text
-from trajectory_guard.workcell import Workcell
 
 SECOND = 10**9
 

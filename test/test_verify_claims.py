@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from random_robot import box_body, core, link_poses, random_body, random_robot
 
-from trajectory_guard.trajectory import JointState, Point, Trajectory
+from trajectory_guard.paths.trajectory import JointState, Point, Trajectory
 from trajectory_guard.verify.claims import Ball, Plane, Turning
 from trajectory_guard.verify.curve import curve
 from trajectory_guard.verify.motion import Arm, Piece

@@ -11,10 +11,10 @@ from test_verify import ROBOT, SCENE
 from typer.testing import CliRunner
 
 from msg_adapters.text import documents
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.urdf import load_robot
 from trajectory_guard.command_line.app import app
-from trajectory_guard.joint_path import joint_path
-from trajectory_guard.scene import load_scene
-from trajectory_guard.urdf import load_robot
+from trajectory_guard.paths.joint_path import joint_path
 
 PLAN = """
 joint_names: [shoulder, elbow]

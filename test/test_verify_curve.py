@@ -7,10 +7,10 @@ from flint import arb, fmpq
 import numpy as np
 import pytest
 
+from trajectory_guard.cell.robot import Joint, JointType, Mimic
 from trajectory_guard.errors import Reason, TrajectoryGuardError
-from trajectory_guard.joint_path import joint_path
-from trajectory_guard.robot import Joint, JointType, Mimic
-from trajectory_guard.trajectory import JointState, Point, Trajectory
+from trajectory_guard.paths.joint_path import joint_path
+from trajectory_guard.paths.trajectory import JointState, Point, Trajectory
 from trajectory_guard.verify.curve import curve
 from trajectory_guard.verify.series import precision
 

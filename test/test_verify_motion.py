@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from random_robot import core, link_poses, random_robot
 
-from trajectory_guard.robot import JointType
-from trajectory_guard.trajectory import JointState, Point, Trajectory
+from trajectory_guard.cell.robot import JointType
+from trajectory_guard.paths.trajectory import JointState, Point, Trajectory
 from trajectory_guard.verify.claims import functional_of
 from trajectory_guard.verify.curve import curve
 from trajectory_guard.verify.levers import Levers

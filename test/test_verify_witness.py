@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from random_robot import box_body, Given
 
+from trajectory_guard.cell.robot import Collision, Joint, JointType, Robot
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge
-from trajectory_guard.primitive import Sphere
+from trajectory_guard.paths.trajectory import Point, Trajectory
 from trajectory_guard.result import Verdict
-from trajectory_guard.robot import Collision, Joint, JointType, Robot
-from trajectory_guard.scene import Obstacle, Scene
 from trajectory_guard.settings import Scope, Settings
-from trajectory_guard.trajectory import Point, Trajectory
+from trajectory_guard.shapes.primitive import Sphere
 from trajectory_guard.verify import verify
-from trajectory_guard.workcell import Workcell
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ import pytest
 from random_robot import box_body, hull_body
 from scipy.spatial.transform import Rotation
 
-from trajectory_guard.body import ConvexBody
-from trajectory_guard.pack import solids
+from trajectory_guard.cell.pack import solids
+from trajectory_guard.shapes.body import ConvexBody
 
 WEIGHTS = np.array([math.comb(CONTROLS - 1, i) for i in range(CONTROLS)])
 

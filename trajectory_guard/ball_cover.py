@@ -13,22 +13,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trajectory_guard.body import ConvexBody, U
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.errors import RequestError
-from trajectory_guard.facets import Faceted, faceted, joined
-from trajectory_guard.floating import stretch
-from trajectory_guard.free_path import FreePath
-from trajectory_guard.joint_path import JointPath
 from trajectory_guard.kernels import layout
 from trajectory_guard.kernels.cover import Covered
-from trajectory_guard.link_motion import Builder, rational_motion
-from trajectory_guard.motion import RationalMotion
-from trajectory_guard.polyhedron import Polyhedron
+from trajectory_guard.motions.floating import stretch
+from trajectory_guard.motions.link_motion import Builder, rational_motion
+from trajectory_guard.motions.motion import RationalMotion
+from trajectory_guard.paths.free_path import FreePath
+from trajectory_guard.paths.joint_path import JointPath
 from trajectory_guard.settings import Scope, Settings
+from trajectory_guard.shapes.body import ConvexBody, U
+from trajectory_guard.shapes.facets import Faceted, faceted, joined
+from trajectory_guard.shapes.polyhedron import Polyhedron
 from trajectory_guard.toleranced.collision import collisions
 from trajectory_guard.toleranced.pair import Pair, pair_of
 from trajectory_guard.toleranced.suspect import Suspect, Why
-from trajectory_guard.workcell import Workcell
 
 # Obstacles whose balls are rounding, below this part of their size, count as one polyhedron.
 ROUNDING = 2.0**-30

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 import os
 
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge_some
+from trajectory_guard.paths.trajectory import JointState, Trajectory
 from trajectory_guard.result import Result
 from trajectory_guard.settings import Settings
-from trajectory_guard.trajectory import JointState, Trajectory
-from trajectory_guard.workcell import Workcell
 
 # Trajectories that one call of the kernels takes.
 TOGETHER = 16

@@ -12,12 +12,12 @@ import json
 
 import numpy as np
 
-from trajectory_guard.joint_path import INTERPOLATION, JointPath
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.kernels import layout
 from trajectory_guard.kernels.cover import Covered
+from trajectory_guard.paths.joint_path import INTERPOLATION, JointPath
+from trajectory_guard.paths.trajectory import JointState, Trajectory
 from trajectory_guard.result import Result
-from trajectory_guard.trajectory import JointState, Trajectory
-from trajectory_guard.workcell import Workcell
 
 FORMAT = 'trajectory_guard/certificate/1'
 

@@ -8,23 +8,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from trajectory_guard.cell.workcell import Pairs, Workcell
 from trajectory_guard.certificate import certificate
 from trajectory_guard.deadline import stop_flag
 from trajectory_guard.errors import Reason, RequestError, TrajectoryGuardError
-from trajectory_guard.floating_path import check_floating_joint, floating_path
-from trajectory_guard.free_path import FreePath
-from trajectory_guard.joint_path import joint_path, JointPath
 from trajectory_guard.kernels.cover import Covered, Question
 from trajectory_guard.kernels.layout import KernelRefused, Path
-from trajectory_guard.multi_dof import MultiDofTrajectory
-from trajectory_guard.multi_dof_path import multi_dof_path
+from trajectory_guard.motions.floating_path import check_floating_joint, floating_path
+from trajectory_guard.paths.free_path import FreePath
+from trajectory_guard.paths.joint_path import joint_path, JointPath
+from trajectory_guard.paths.multi_dof import MultiDofTrajectory
+from trajectory_guard.paths.multi_dof_path import multi_dof_path
+from trajectory_guard.paths.trajectory import JointState, Trajectory
 from trajectory_guard.refine import cover_refined, Seen
 from trajectory_guard.request import check_joints, motion_path, refusal, tracking_slack
 from trajectory_guard.result import ContactMoment, Interval, NANOSECONDS, Result, Status, Verdict
 from trajectory_guard.settings import Cover, Settings
 from trajectory_guard.timeline import intervals, with_witnesses
-from trajectory_guard.trajectory import JointState, Trajectory
-from trajectory_guard.workcell import Pairs, Workcell
 
 _log = logging.getLogger(__name__)
 

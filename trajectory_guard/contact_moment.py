@@ -9,16 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trajectory_guard.body import ConvexBody
 from trajectory_guard.canny.along import along
 from trajectory_guard.canny.constraint import Kind
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.errors import RequestError
-from trajectory_guard.facets import faceted
-from trajectory_guard.joint_path import JointPath
-from trajectory_guard.link_motion import Builder, rational_motion
-from trajectory_guard.motion import RationalMotion
+from trajectory_guard.motions.link_motion import Builder, rational_motion
+from trajectory_guard.motions.motion import RationalMotion
+from trajectory_guard.paths.joint_path import JointPath
 from trajectory_guard.result import ContactMoment, Interval, Status
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.shapes.body import ConvexBody
+from trajectory_guard.shapes.facets import faceted
 
 # Planes whose unit normals differ by less are one face.
 FLAT = 1e-6

@@ -6,9 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trajectory_guard.containment import may_contain
-from trajectory_guard.detail import Detail, Level
-from trajectory_guard.jumps import jumps
+from trajectory_guard.cell.detail import Detail, Level
 from trajectory_guard.kernels.layout import (
     BALL,
     BY_ENCLOSURE,
@@ -20,8 +18,10 @@ from trajectory_guard.kernels.layout import (
     SUSPECT,
 )
 from trajectory_guard.kernels.link_motion import link_motion
+from trajectory_guard.paths.jumps import jumps
 from trajectory_guard.refine import Seen
-from trajectory_guard.surface import Surface
+from trajectory_guard.shapes.containment import may_contain
+from trajectory_guard.shapes.surface import Surface
 
 # A run's pairs are looked at in a piece of this level or so, where the motion's error is small.
 SHORT = 12

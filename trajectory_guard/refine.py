@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trajectory_guard.detail import Detail, Level
+from trajectory_guard.cell.detail import Detail, Level
 from trajectory_guard.kernels.cover import cover_all, Covered, Question
 from trajectory_guard.kernels.layout import BY_BUDGET, BY_HULL, BY_STOP
 from trajectory_guard.settings import Settings

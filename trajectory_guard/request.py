@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from trajectory_guard.cell.robot import Joint
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.errors import Reason, RequestError
-from trajectory_guard.floating import floating
-from trajectory_guard.joint_path import JointPath
 from trajectory_guard.kernels.layout import Path
-from trajectory_guard.robot import Joint
+from trajectory_guard.motions.floating import floating
+from trajectory_guard.paths.joint_path import JointPath
 from trajectory_guard.settings import Settings
-from trajectory_guard.workcell import Workcell
 
 # Coordinates beyond this would overflow somewhere in a product of control matrices [m or rad].
 LARGEST = 1e9

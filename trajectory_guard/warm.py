@@ -5,16 +5,16 @@ import time
 
 import numpy as np
 
-from trajectory_guard.body import ConvexBody
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.urdf import robot_from_urdf
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge
 from trajectory_guard.errors import Reason, TrajectoryGuardError
 from trajectory_guard.kernels.compiled import COMPILING, is_cold
+from trajectory_guard.paths.trajectory import Point, Trajectory
 from trajectory_guard.result import Verdict
-from trajectory_guard.scene import Obstacle, Scene
 from trajectory_guard.settings import Cover, Settings
-from trajectory_guard.trajectory import Point, Trajectory
-from trajectory_guard.urdf import robot_from_urdf
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.shapes.body import ConvexBody
 
 _ROBOT = """
 <robot name="warm_up">

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from trajectory_guard.primitive import Box
+from trajectory_guard.cell.robot import Robot
+from trajectory_guard.cell.scene import Obstacle, Scene
+from trajectory_guard.cell.urdf import load_robot, robot_from_urdf
+from trajectory_guard.paths.trajectory import Point, Trajectory
 from trajectory_guard.result import NANOSECONDS
-from trajectory_guard.robot import Robot
-from trajectory_guard.scene import Obstacle, Scene
-from trajectory_guard.trajectory import Point, Trajectory
-from trajectory_guard.urdf import load_robot, robot_from_urdf
+from trajectory_guard.shapes.primitive import Box
 
 DATA = Path(__file__).parent.parent.parent / 'test' / 'data' / 'bench'
 PANDA = DATA / 'panda.urdf'

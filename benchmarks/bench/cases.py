@@ -6,13 +6,13 @@ import json
 from pathlib import Path
 
 from bench.peers import Baseline, Spline
-from trajectory_guard.joint_path import joint_path, JointPath
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.urdf import load_robot
+from trajectory_guard.cell.workcell import Workcell
+from trajectory_guard.paths.joint_path import joint_path, JointPath
+from trajectory_guard.paths.trajectory import Point, Trajectory
 from trajectory_guard.result import NANOSECONDS, Result, Status, Verdict
-from trajectory_guard.scene import load_scene
 from trajectory_guard.settings import Settings
-from trajectory_guard.trajectory import Point, Trajectory
-from trajectory_guard.urdf import load_robot
-from trajectory_guard.workcell import Workcell
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ from scipy.spatial import cKDTree, ConvexHull
 
 from bench.built import box, from_rest_to_rest, panda
 from bench.kinematics import placed
-from trajectory_guard.joint_path import joint_path, JointPath
-from trajectory_guard.robot import Robot
-from trajectory_guard.scene import Obstacle
+from trajectory_guard.cell.robot import Robot
+from trajectory_guard.cell.scene import Obstacle
+from trajectory_guard.paths.joint_path import joint_path, JointPath
 
 CLEARANCE = 0.05
 SEED = 1

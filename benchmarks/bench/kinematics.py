@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from trajectory_guard.robot import JointType, Robot
+from trajectory_guard.cell.robot import JointType, Robot
 
 
 def moved_links(robot: Robot) -> set[str]:

@@ -14,12 +14,12 @@ from scipy.spatial import ConvexHull
 
 from bench.compiled import library
 from bench.kinematics import moved_links
-from trajectory_guard.body import ConvexBody
-from trajectory_guard.joint_path import JointPath
-from trajectory_guard.primitive import sphere_directions
+from trajectory_guard.cell.robot import Joint, JointType
+from trajectory_guard.cell.workcell import Workcell
+from trajectory_guard.paths.joint_path import JointPath
 from trajectory_guard.result import NANOSECONDS
-from trajectory_guard.robot import Joint, JointType
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.shapes.body import ConvexBody
+from trajectory_guard.shapes.primitive import sphere_directions
 
 # What counts as contact, as coal's distance may be too large [m], and the shortest span [s].
 MARGIN = 1e-6

@@ -13,15 +13,15 @@ from scipy.spatial import ConvexHull
 
 from drawing.camera import Camera
 from drawing.palette import BODY, FAINT, INK
-from trajectory_guard.joint_path import joint_path, JointPath
-from trajectory_guard.link_motion import rational_motion
-from trajectory_guard.scene import load_scene
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.urdf import load_robot
+from trajectory_guard.cell.workcell import Workcell
+from trajectory_guard.motions.link_motion import rational_motion
+from trajectory_guard.paths.joint_path import joint_path, JointPath
+from trajectory_guard.paths.trajectory import Point, Trajectory
 from trajectory_guard.toleranced.bounding_ball import control_ball
 from trajectory_guard.toleranced.metric import MassDistribution
 from trajectory_guard.toleranced.minimum_ellipsoid import least_distortion
-from trajectory_guard.trajectory import Point, Trajectory
-from trajectory_guard.urdf import load_robot
-from trajectory_guard.workcell import Workcell
 
 BENCH = Path(__file__).parents[2] / 'test' / 'data' / 'bench'
 LINK = 'forearm_link'

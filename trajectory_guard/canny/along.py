@@ -45,10 +45,10 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajectory_guard.body import LARGEST_COORDINATE, U
 from trajectory_guard.canny.constraint import Kind
 from trajectory_guard.errors import Reason, RequestError
-from trajectory_guard.motion import RationalMotion
+from trajectory_guard.motions.motion import RationalMotion
+from trajectory_guard.shapes.body import LARGEST_COORDINATE, U
 
 # Bounds are sums and products of many non-negative terms, each rounded.
 UP = 1.0 + 2.0**-40

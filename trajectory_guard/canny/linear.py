@@ -25,7 +25,6 @@ from typing import NoReturn
 from flint import fmpz_poly
 import numpy as np
 
-from trajectory_guard.body import LARGEST_COORDINATE
 from trajectory_guard.canny.integers import exponent, scaled
 from trajectory_guard.canny.moment import Moment, moment
 from trajectory_guard.canny.polynomial import (
@@ -39,6 +38,7 @@ from trajectory_guard.canny.signs import place, Signs, trace
 from trajectory_guard.canny.transitions import all_of, any_of, both, runs, Transitions
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.kernels import canny as kernel
+from trajectory_guard.shapes.body import LARGEST_COORDINATE
 
 DEGREE = 3
 

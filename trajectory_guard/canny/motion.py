@@ -19,11 +19,11 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajectory_guard.body import LARGEST_COORDINATE, read_only
 from trajectory_guard.canny.integers import exponent, scaled
 from trajectory_guard.canny.polynomial import dot_product, from_bernstein
 from trajectory_guard.canny.root import isolate
 from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.shapes.body import LARGEST_COORDINATE, read_only
 
 # Quaternions are taken in this range so that no product of them overflows or vanishes in doubles.
 SMALLEST_QUATERNION = 2.0**-40

@@ -8,10 +8,10 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajectory_guard.body import LARGEST_COORDINATE, read_only
 from trajectory_guard.canny.exact_hull import exact_hull
 from trajectory_guard.canny.integers import cross, dot, exponent, minus, scaled
 from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.shapes.body import LARGEST_COORDINATE, read_only
 
 
 @dataclass(frozen=True, slots=True, eq=False)

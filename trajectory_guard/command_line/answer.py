@@ -7,6 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from trajectory_guard.cell.free_body import load_moving
+from trajectory_guard.cell.pose import pose_matrix
+from trajectory_guard.cell.robot import Robot
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge
 from trajectory_guard.command_line.certificates import Certificates, is_folder
 from trajectory_guard.command_line.options import Pose
@@ -14,14 +19,9 @@ from trajectory_guard.command_line.request import Request, SELF_COLLISION_WARNIN
 from trajectory_guard.command_line.sources import Selection, Source, sources
 from trajectory_guard.command_line.start import completed, depends_on_duration, without
 from trajectory_guard.errors import Reason, RequestError, TrajectoryError
-from trajectory_guard.free_body import load_moving
-from trajectory_guard.multi_dof import MultiDofTrajectory
-from trajectory_guard.pose import pose_matrix
+from trajectory_guard.paths.multi_dof import MultiDofTrajectory
 from trajectory_guard.result import Result
-from trajectory_guard.robot import Robot
-from trajectory_guard.scene import load_scene
 from trajectory_guard.warm import warm_up
-from trajectory_guard.workcell import Workcell
 
 UNMEASURED = (
     'no joint state was recorded before this trajectory; --joint-states names the topic if it is '

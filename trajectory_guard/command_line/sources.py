@@ -8,8 +8,8 @@ from msg_adapters.bag import is_bag
 from msg_adapters.recorded import recorded_trajectories
 from msg_adapters.text import documents, MAX_CHARACTERS
 from trajectory_guard.errors import Reason, TrajectoryError
-from trajectory_guard.multi_dof import MultiDofTrajectory
-from trajectory_guard.trajectory import JointState, Trajectory
+from trajectory_guard.paths.multi_dof import MultiDofTrajectory
+from trajectory_guard.paths.trajectory import JointState, Trajectory
 
 
 class Source(NamedTuple):

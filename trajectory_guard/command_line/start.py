@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from trajectory_guard.trajectory import JointState, Trajectory
+from trajectory_guard.paths.trajectory import JointState, Trajectory
 
 
 def completed(measured: JointState | None, given: Mapping[str, float]) -> JointState | None:

@@ -6,17 +6,17 @@ from pathlib import Path
 import sys
 from typing import Any, NamedTuple
 
+from trajectory_guard.cell.pose import pose_matrix
+from trajectory_guard.cell.robot import Robot
+from trajectory_guard.cell.scene import load_scene, Scene
+from trajectory_guard.cell.urdf import load_robot
 from trajectory_guard.command_line.exit_code import ExitCode
 from trajectory_guard.command_line.printable import printable
 from trajectory_guard.command_line.request import Verification
 from trajectory_guard.command_line.sources import Selection, sources
 from trajectory_guard.errors import Reason, TrajectoryError, TrajectoryGuardError
-from trajectory_guard.pose import pose_matrix
+from trajectory_guard.paths.trajectory import Trajectory
 from trajectory_guard.result import NANOSECONDS
-from trajectory_guard.robot import Robot
-from trajectory_guard.scene import load_scene, Scene
-from trajectory_guard.trajectory import Trajectory
-from trajectory_guard.urdf import load_robot
 from trajectory_guard.verify import Verified, verify
 from trajectory_guard.verify.document import parse
 from trajectory_guard.verify.verified import TRUSTED

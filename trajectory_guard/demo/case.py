@@ -7,8 +7,8 @@ from msg_adapters.text import trajectories_from_text
 from trajectory_guard.demo.files import config_file
 from trajectory_guard.demo.poses import Sampled
 from trajectory_guard.errors import Reason, TrajectoryError
+from trajectory_guard.paths.trajectory import Trajectory
 from trajectory_guard.result import Result, Status, Verdict
-from trajectory_guard.trajectory import Trajectory
 
 SCENE = 'demo_scene.urdf'
 

@@ -15,8 +15,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from trajectory_guard.paths.trajectory import Trajectory
 from trajectory_guard.result import NANOSECONDS
-from trajectory_guard.trajectory import Trajectory
 
 # Times are medians of so many runs.
 REPETITIONS = 10

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from rclpy.service_introspection import ServiceIntrospectionState
 
+from trajectory_guard.cell.pose import pose_matrix
 from trajectory_guard.errors import Reason, RequestError
-from trajectory_guard.marker_scene import MarkerLimits
-from trajectory_guard.pose import pose_matrix
-from trajectory_guard.resource import MeshLimits
+from trajectory_guard.markers.marker_scene import MarkerLimits
 from trajectory_guard.result import NANOSECONDS
 from trajectory_guard.ros.declared import names_in, per_joint
 from trajectory_guard.settings import Cover, Settings
+from trajectory_guard.shapes.resource import MeshLimits
 
 INTROSPECTION = {
     'off': ServiceIntrospectionState.OFF,

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from trajectory_guard.entry import Allowance
 from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.paths.entry import Allowance
 from trajectory_guard.result import NANOSECONDS
 from trajectory_guard.ros.declared import names_in, per_joint
 

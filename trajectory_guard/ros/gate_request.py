@@ -10,11 +10,11 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from msg_adapters.result import nanoseconds_to_message, result_from_message
 from msg_adapters.trajectory import nanoseconds_from_message
-from trajectory_guard.entry import Entry
 from trajectory_guard.errors import Reason, RequestError
-from trajectory_guard.joint_path import INTERPOLATION
+from trajectory_guard.paths.entry import Entry
+from trajectory_guard.paths.joint_path import INTERPOLATION
+from trajectory_guard.paths.takeover import Takeover
 from trajectory_guard.result import Result, Status, Verdict
-from trajectory_guard.takeover import Takeover
 
 # Sums of two tolerances are rounded; what is asked for must not be less.
 _UP = 1.0 + 2.0**-50

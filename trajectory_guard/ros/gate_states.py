@@ -4,7 +4,7 @@ from collections.abc import Mapping
 import math
 from typing import Any, NamedTuple
 
-from trajectory_guard.entry import Measured
+from trajectory_guard.paths.entry import Measured
 
 # More names than any robot has, so that a broken publisher cannot fill the memory.
 MOST_JOINTS = 1000

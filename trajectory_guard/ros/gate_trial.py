@@ -8,9 +8,9 @@ from rclpy.task import Future
 from trajectory_guard_interfaces.msg import CertificationResult, GateDecision
 from trajectory_guard_interfaces.srv import CertifyTrajectory
 
+from trajectory_guard.paths.takeover import Takeover
+from trajectory_guard.paths.trajectory import Trajectory
 from trajectory_guard.ros.gate_configuration import GateConfiguration
-from trajectory_guard.takeover import Takeover
-from trajectory_guard.trajectory import Trajectory
 
 
 @dataclass(slots=True, eq=False)

@@ -12,13 +12,13 @@ from trajectory_msgs.msg import JointTrajectory
 from msg_adapters.result import nanoseconds_to_message
 from msg_adapters.trajectory import stamp_from_message, trajectory_from_message
 from trajectory_guard.errors import Reason, RequestError, TrajectoryGuardError
+from trajectory_guard.paths.takeover import takeover
 from trajectory_guard.ros.declared import per_joint
 from trajectory_guard.ros.gate_configuration import GateConfiguration
 from trajectory_guard.ros.gate_guard import GuardClient, least_from_response
 from trajectory_guard.ros.gate_request import refusal, request_for
 from trajectory_guard.ros.gate_states import JointStates
 from trajectory_guard.ros.gate_trial import Trial
-from trajectory_guard.takeover import takeover
 
 
 class Gatekeeper:

@@ -20,6 +20,7 @@ from trajectory_guard_interfaces.msg import GuardStatus
 from trajectory_guard_interfaces.srv import CertifyTrajectory
 
 from msg_adapters.result import result_to_message, ros_message_types
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certificate import text
 from trajectory_guard.certify import judge
 from trajectory_guard.errors import Reason, RequestError, TrajectoryGuardError
@@ -37,7 +38,6 @@ from trajectory_guard.ros.parameters import DECLARATIONS
 from trajectory_guard.ros.question import measured_start, Question, question_from_request
 from trajectory_guard.ros.status import StatusPublisher
 from trajectory_guard.warm import warm_up
-from trajectory_guard.workcell import Workcell
 
 NAME = 'guard'
 STATUS = '~/status'

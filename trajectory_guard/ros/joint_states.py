@@ -16,8 +16,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState as JointStateMessage
 
 from msg_adapters.trajectory import joint_state_from_message, nanoseconds_from_message
+from trajectory_guard.paths.trajectory import JointState
 from trajectory_guard.result import NANOSECONDS
-from trajectory_guard.trajectory import JointState
 
 # What came since the last look is read this often [s], ...
 PERIOD = 0.02

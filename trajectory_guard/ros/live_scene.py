@@ -31,8 +31,8 @@ from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.marker import added_keys, changes_from_message
 from trajectory_guard.errors import Reason, SceneError, TrajectoryGuardError
-from trajectory_guard.live_markers import LiveMarkers
-from trajectory_guard.marker_scene import Frames, MarkerLimits
+from trajectory_guard.markers.live_markers import LiveMarkers
+from trajectory_guard.markers.marker_scene import Frames, MarkerLimits
 
 # What was published before the node came too, and nothing is lost: of a bounded queue, arrays that
 # come faster than they are taken would fall out silently, and an obstacle with them.

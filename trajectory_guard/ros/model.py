@@ -10,15 +10,15 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.subscription import Subscription
 from std_msgs.msg import String
 
+from trajectory_guard.cell.robot import Robot
+from trajectory_guard.cell.scene import load_scene, Scene
+from trajectory_guard.cell.urdf import load_robot, robot_from_urdf
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.errors import Reason, RequestError, SceneError, TrajectoryGuardError
-from trajectory_guard.marker_scene import fixed_frames, Frames, with_markers
+from trajectory_guard.markers.marker_scene import fixed_frames, Frames, with_markers
 from trajectory_guard.result import NANOSECONDS
-from trajectory_guard.robot import Robot
 from trajectory_guard.ros.configuration import Configuration
 from trajectory_guard.ros.live_scene import LiveScene
-from trajectory_guard.scene import load_scene, Scene
-from trajectory_guard.urdf import load_robot, robot_from_urdf
-from trajectory_guard.workcell import Workcell
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 

@@ -19,11 +19,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.moment_markers import moments_to_message
-from trajectory_guard.moments import moments, MOST
-from trajectory_guard.multi_dof import MultiDofTrajectory
+from trajectory_guard.cell.workcell import Workcell
+from trajectory_guard.markers.moments import moments, MOST
+from trajectory_guard.paths.multi_dof import MultiDofTrajectory
+from trajectory_guard.paths.trajectory import JointState, Trajectory
 from trajectory_guard.result import Result
-from trajectory_guard.trajectory import JointState, Trajectory
-from trajectory_guard.workcell import Workcell
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 

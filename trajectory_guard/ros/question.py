@@ -9,12 +9,12 @@ from msg_adapters.trajectory import (
     nanoseconds_from_message,
     trajectory_from_message,
 )
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.paths.trajectory import JointState, Trajectory
 from trajectory_guard.result import NANOSECONDS
 from trajectory_guard.ros.configuration import Configuration
 from trajectory_guard.settings import Scope, Settings
-from trajectory_guard.trajectory import JointState, Trajectory
-from trajectory_guard.workcell import Workcell
 
 # The seconds of a Duration are an int32, and the answer gives the times back as Durations.
 LAST_INSTANT_NS = 2**31 * NANOSECONDS - 1

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from trajectory_guard.body import read_only, U
+from trajectory_guard.shapes.body import read_only, U
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from trajectory_guard.body import U, UNDERFLOW
+from trajectory_guard.shapes.body import U, UNDERFLOW
 from trajectory_guard.toleranced.curve_bounds import (
     checked,
     curvature_bound,

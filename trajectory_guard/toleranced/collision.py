@@ -17,7 +17,7 @@ import numpy as np
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.kernels import ball
 from trajectory_guard.kernels.ball import Curve, Limits
-from trajectory_guard.polyhedron import Polyhedron
+from trajectory_guard.shapes.polyhedron import Polyhedron
 from trajectory_guard.toleranced.containment import surely_apart
 from trajectory_guard.toleranced.curve import curve_of, errors_of, Motion
 from trajectory_guard.toleranced.pair import Pair, pair_of

@@ -6,10 +6,10 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from trajectory_guard.body import U
-from trajectory_guard.containment import may_contain
 from trajectory_guard.kernels.ball import Curve
-from trajectory_guard.polyhedron import Polyhedron
+from trajectory_guard.shapes.body import U
+from trajectory_guard.shapes.containment import may_contain
+from trajectory_guard.shapes.polyhedron import Polyhedron
 
 
 @dataclass(frozen=True, slots=True, eq=False)

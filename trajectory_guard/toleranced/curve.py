@@ -4,9 +4,9 @@ from typing import Protocol
 
 import numpy as np
 
-from trajectory_guard.body import LARGEST_COORDINATE
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.kernels.ball import Curve
+from trajectory_guard.shapes.body import LARGEST_COORDINATE
 
 # Weights within a factor of this lose nothing to underflow when they are halved and divided.
 LARGEST_RATIO = 2.0**200

@@ -10,8 +10,8 @@ from typing import Protocol
 
 import numpy as np
 
-from trajectory_guard.body import U, UNDERFLOW
 from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.shapes.body import U, UNDERFLOW
 from trajectory_guard.toleranced.metric import MassDistribution
 
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trajectory_guard.body import LARGEST_COORDINATE, read_only, U, UNDERFLOW
 from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.shapes.body import LARGEST_COORDINATE, read_only, U, UNDERFLOW
 from trajectory_guard.toleranced.affine import Affine
 from trajectory_guard.toleranced.metric import MassDistribution
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from trajectory_guard.body import LARGEST_COORDINATE, read_only
 from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.shapes.body import LARGEST_COORDINATE, read_only
 from trajectory_guard.toleranced.contact import apart
 from trajectory_guard.toleranced.displacement_ball import DisplacementBall, Orbit
 from trajectory_guard.toleranced.distance import largest_accepted

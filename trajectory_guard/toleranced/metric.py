@@ -6,8 +6,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajectory_guard.body import LARGEST_COORDINATE, read_only, U, UNDERFLOW
 from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.shapes.body import LARGEST_COORDINATE, read_only, U, UNDERFLOW
 from trajectory_guard.toleranced.moments import (
     Moments,
     point_moments,

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajectory_guard.body import LARGEST_COORDINATE
 from trajectory_guard.errors import Reason, RequestError
-from trajectory_guard.inscribed import is_closed
+from trajectory_guard.shapes.body import LARGEST_COORDINATE
+from trajectory_guard.shapes.inscribed import is_closed
 
 
 class Moments(NamedTuple):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from trajectory_guard.body import U
 from trajectory_guard.kernels.ball import Metric, Surface
+from trajectory_guard.shapes.body import U
 from trajectory_guard.toleranced.face_moments import (
     face_moments,
     Moments,

@@ -6,7 +6,7 @@ import numpy as np
 
 from trajectory_guard.errors import Reason, RequestError
 from trajectory_guard.kernels.ball import Packed
-from trajectory_guard.polyhedron import Polyhedron
+from trajectory_guard.shapes.polyhedron import Polyhedron
 from trajectory_guard.toleranced.containment import Probe, probe
 from trajectory_guard.toleranced.face_moments import given_moments
 from trajectory_guard.toleranced.node_metric import node_metric

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trajectory_guard.body import read_only
 from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.shapes.body import read_only
 from trajectory_guard.toleranced.displacement_ball import DisplacementBall
 from trajectory_guard.toleranced.polygon import plane_axes
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from trajectory_guard.body import LARGEST_COORDINATE, read_only
 from trajectory_guard.errors import Reason, RequestError
+from trajectory_guard.shapes.body import LARGEST_COORDINATE, read_only
 
 # Rounded corners leave the plane and cross products their sign by a few units of rounding; a
 # polygon worse than this, as a fraction of its size, is not meant to be flat.

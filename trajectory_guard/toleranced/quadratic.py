@@ -39,7 +39,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trajectory_guard.body import U
+from trajectory_guard.shapes.body import U
 from trajectory_guard.toleranced.affine import Affine
 
 VALUE = 64.0 * U

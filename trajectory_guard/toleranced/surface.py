@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trajectory_guard.body import U
-from trajectory_guard.face_tree import face_tree, FaceTree
 from trajectory_guard.kernels.ball import Surface
-from trajectory_guard.polyhedron import Polyhedron
+from trajectory_guard.shapes.body import U
+from trajectory_guard.shapes.face_tree import face_tree, FaceTree
+from trajectory_guard.shapes.polyhedron import Polyhedron
 
 
 class _Parts(NamedTuple):

@@ -6,9 +6,9 @@ from typing import Any
 
 from flint import arb
 
+from trajectory_guard.cell.robot import Robot
+from trajectory_guard.cell.scene import Scene
 from trajectory_guard.errors import TrajectoryGuardError
-from trajectory_guard.robot import Robot
-from trajectory_guard.scene import Scene
 from trajectory_guard.verify.claims import Ball, Plane, Turning
 from trajectory_guard.verify.curve import Curve
 from trajectory_guard.verify.entries import Entry

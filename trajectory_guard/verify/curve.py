@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from flint import arb, arb_poly, fmpq, fmpq_poly
 
-from trajectory_guard.robot import Joint
-from trajectory_guard.trajectory import JointState, Trajectory
+from trajectory_guard.cell.robot import Joint
+from trajectory_guard.paths.trajectory import JointState, Trajectory
 from trajectory_guard.verify.invalid import invalid
 from trajectory_guard.verify.knots import approach, Knot, known_positions, points, rational
 

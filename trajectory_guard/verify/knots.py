@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 from flint import arb, fmpq
 
-from trajectory_guard.robot import Joint, JointType
-from trajectory_guard.trajectory import JointState, Trajectory
+from trajectory_guard.cell.robot import Joint, JointType
+from trajectory_guard.paths.trajectory import JointState, Trajectory
 from trajectory_guard.verify.invalid import invalid
 
 # The controller adds whole turns in doubles: its float errs by at most 4 u of their size.

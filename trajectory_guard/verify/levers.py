@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 from flint import arb, arb_mat
 
-from trajectory_guard.body import ConvexBody
-from trajectory_guard.robot import Joint, JointType
+from trajectory_guard.cell.robot import Joint, JointType
+from trajectory_guard.shapes.body import ConvexBody
 from trajectory_guard.verify.motion import Arm, Piece
 from trajectory_guard.verify.vector import largest, length
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from flint import arb, arb_mat, arb_poly, fmpq
 
-from trajectory_guard.robot import Joint, JointType, Robot
+from trajectory_guard.cell.robot import Joint, JointType, Robot
 from trajectory_guard.verify.curve import Curve
 from trajectory_guard.verify.series import ANY, bernstein, cos_sin, DEGREE, shortened
 

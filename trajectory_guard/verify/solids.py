@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from flint import arb, arb_mat
 
-from trajectory_guard.body import ConvexBody
+from trajectory_guard.shapes.body import ConvexBody
 from trajectory_guard.verify.levers import Levers
 from trajectory_guard.verify.motion import Arm, Piece
 from trajectory_guard.verify.vector import largest, least, length, Vector

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import time
 from typing import Any
 
+from trajectory_guard.cell.robot import Robot
+from trajectory_guard.cell.scene import Scene
 from trajectory_guard.errors import TrajectoryGuardError
-from trajectory_guard.robot import Robot
-from trajectory_guard.scene import Scene
-from trajectory_guard.trajectory import JointState, Trajectory
+from trajectory_guard.paths.trajectory import JointState, Trajectory
 from trajectory_guard.verify.cell import Cell
 from trajectory_guard.verify.cover import by_pair, check_collision, check_free, partition, spans
 from trajectory_guard.verify.curve import curve

@@ -7,8 +7,8 @@ of the translation are free. Motions of one experiment differ by a constant tran
 
 import numpy as np
 
-from trajectory_guard.free_motion.quaternion_curve import rotation_over
-from trajectory_guard.motion import RationalMotion
+from trajectory_guard.motions.motion import RationalMotion
+from trajectory_guard.paths.free_motion.quaternion_curve import rotation_over
 
 
 def turned(quaternions: np.ndarray, path: np.ndarray) -> RationalMotion:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from trajectory_guard.polyhedron import Polyhedron
+from trajectory_guard.shapes.polyhedron import Polyhedron
 
 
 def octagon(radius: float) -> Polyhedron:

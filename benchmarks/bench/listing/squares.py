@@ -8,7 +8,7 @@ import numpy as np
 from bench.clock import best_ms
 from bench.listing.motions import square_motion
 from bench.listing.shapes import squares
-from trajectory_guard.motion import RationalMotion
+from trajectory_guard.motions.motion import RationalMotion
 from trajectory_guard.toleranced.collision import collisions
 from trajectory_guard.toleranced.pair import Pair, pair_of
 

@@ -12,10 +12,10 @@ from bench.clock import interleaved, percentile, RUNS
 from bench.peers import FREE, MARGIN
 from trajectory_guard.certify import certify, judge
 from trajectory_guard.kernels.cover import cover
+from trajectory_guard.paths.trajectory import Trajectory
 from trajectory_guard.request import motion_path
 from trajectory_guard.result import NANOSECONDS, Result, Status
 from trajectory_guard.settings import Scope, Settings
-from trajectory_guard.trajectory import Trajectory
 
 # The kernels on a ready curve, as conservative advancement is called; and with Python around them.
 OURS_VERDICT, OURS_INTERVALS = 'ours verdict', 'ours intervals'

@@ -8,11 +8,11 @@ from bench.cases import Bench
 from bench.clock import best_ms
 from bench.clutter import CLEARANCE, strewn
 from bench.peers import Baseline, Spline
+from trajectory_guard.cell.scene import Scene
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import certify
 from trajectory_guard.result import Verdict
-from trajectory_guard.scene import Scene
 from trajectory_guard.settings import Settings
-from trajectory_guard.workcell import Workcell
 
 COUNTS = (1, 10, 50, 200, 1000, 10_000)
 MOST_MS = {200: 1.0}

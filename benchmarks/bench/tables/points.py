@@ -7,13 +7,13 @@ import numpy as np
 from bench.built import panda, SCENE
 from bench.cases import Bench
 from bench.clock import interleaved
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import certify, judge
-from trajectory_guard.joint_path import joint_path
+from trajectory_guard.paths.joint_path import joint_path
+from trajectory_guard.paths.trajectory import Trajectory
 from trajectory_guard.result import NANOSECONDS, Status
-from trajectory_guard.scene import load_scene
 from trajectory_guard.settings import Scope, Settings
-from trajectory_guard.trajectory import Trajectory
-from trajectory_guard.workcell import Workcell
 
 COUNTS = (10, 100, 1000, 10_000)
 

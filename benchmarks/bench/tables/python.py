@@ -14,12 +14,12 @@ from typing import Any
 from bench.built import PANDA, panda_with_meshes, SCENE
 from bench.cases import Bench, settings, waypoints
 from bench.clock import best_ms, interleaved, no_collection, RUNS
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.cell.urdf import load_robot
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import judge
 from trajectory_guard.kernels.compiled import library
-from trajectory_guard.scene import load_scene
-from trajectory_guard.trajectory import Trajectory
-from trajectory_guard.urdf import load_robot
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.paths.trajectory import Trajectory
 
 # What a request calls of them.
 KERNELS = ('guard_cover', 'guard_touching')
@@ -28,10 +28,10 @@ OVERHEAD_MS, LOADING_S, START_S, COMPILE_S = 0.2, 0.3, 1.5, 15.0
 
 FIRST_ANSWER = f"""
 from trajectory_guard.certify import judge
-from trajectory_guard.scene import load_scene
-from trajectory_guard.trajectory import Point, Trajectory
-from trajectory_guard.urdf import load_robot
-from trajectory_guard.workcell import Workcell
+from trajectory_guard.cell.scene import load_scene
+from trajectory_guard.paths.trajectory import Point, Trajectory
+from trajectory_guard.cell.urdf import load_robot
+from trajectory_guard.cell.workcell import Workcell
 
 cell = Workcell(load_robot({str(PANDA)!r}), load_scene({str(SCENE)!r}))
 names = [joint.name for joint in cell.robot.movable]

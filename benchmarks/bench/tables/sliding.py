@@ -9,13 +9,13 @@ from bench.cases import Bench
 from bench.clock import best_ms
 from bench.kinematics import placed, turn
 from bench.peers import Baseline, Spline, VERDICTS
+from trajectory_guard.cell.robot import Robot
+from trajectory_guard.cell.scene import Scene
+from trajectory_guard.cell.workcell import Workcell
 from trajectory_guard.certify import certify
-from trajectory_guard.joint_path import joint_path
+from trajectory_guard.paths.joint_path import joint_path
 from trajectory_guard.result import Verdict
-from trajectory_guard.robot import Robot
-from trajectory_guard.scene import Scene
 from trajectory_guard.settings import Settings
-from trajectory_guard.workcell import Workcell
 
 GAP = 1e-5
 SETTINGS = Settings(tolerance=1e-6)

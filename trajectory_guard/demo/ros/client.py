@@ -17,8 +17,8 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from msg_adapters.result import result_from_message
 from trajectory_guard.demo.answer import Answer
 from trajectory_guard.demo.error import DemoError
+from trajectory_guard.paths.trajectory import Trajectory
 from trajectory_guard.result import NANOSECONDS
-from trajectory_guard.trajectory import Trajectory
 
 # How long one look at the network lasts before the guard is looked at again [s].
 _SLICE = 0.2

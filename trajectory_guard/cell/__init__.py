@@ -1,0 +1,1 @@
+"""Robot and scene: read, checked, and packed for every request."""

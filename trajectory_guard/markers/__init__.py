@@ -1,0 +1,1 @@
+"""What a viewer shows: live obstacles, and the moments of an answer."""

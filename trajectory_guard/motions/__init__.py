@@ -1,0 +1,1 @@
+"""Curves in the space of displacements, with a bound on their error."""

@@ -1,0 +1,1 @@
+"""Solids: primitives, hulls and meshes, what contains them and what lies inside."""
