@@ -38,6 +38,9 @@ def _serve() -> None:
     try:
         _answer_until_stopped(executor, guard)
     finally:
+        # Callbacks end first: shutting down does not wait for them (rclpy of Jazzy), and one that
+        # ends later says so on stderr.
+        executor._executor.shutdown()
         executor.shutdown()
         guard.destroy_node()
 
