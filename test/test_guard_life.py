@@ -191,6 +191,10 @@ def test_life(managed: GuardProcess, manager: Manager, ask: Asker, files: Path) 
     assert rejection(ask.result('managed', FREE)) == Reason.NOT_READY
     assert 'inactive' in manager.says(lambda said: not said.ready).message
     assert manager.set(**other) == ''
+    # It would answer by what was loaded, not by what its parameters say.
+    assert not manager.change(Transition.TRANSITION_ACTIVATE)
+    assert manager.state() == State.PRIMARY_STATE_INACTIVE
+    assert 'scene_pose' in managed.said()
     assert manager.change(Transition.TRANSITION_CLEANUP)
     assert rejection(ask.result('managed', FREE)) == Reason.NOT_READY
     assert manager.change(Transition.TRANSITION_CONFIGURE)
