@@ -4,9 +4,10 @@ from collections.abc import Iterator
 import time
 
 from builtin_interfaces.msg import Time
-from gate_process import Bench, fake_guard, FakeGuard, gate_process
+from gate_process import Bench, fake_guard, FakeGuard, gate_process, soon
 from guard_process import asker, message, parameters
 import pytest
+from rclpy.serialization import serialize_message
 
 FREE = message((0.0, [0.0, 0.0]), (1.0, [0.5, 0.5]))
 
@@ -47,3 +48,14 @@ def test_a_stamp_of_negative_seconds_is_none_though_its_sum_is(bench: Bench, sec
     # The controller's type of time raises at negative seconds.
     trajectory.header.stamp = Time(sec=sec, nanosec=-sec * 10**9)
     assert bench.code(trajectory) == 'stamp_invalid'
+
+
+@pytest.mark.parametrize('encapsulation', [0x03, 0x07, 0x09, 0x0B])
+def test_an_encoding_that_another_vendor_reads_otherwise(bench: Bench, encapsulation: int) -> None:
+    time.sleep(2 * DELAY)
+    raw = serialize_message(FREE)
+    count = len(bench.decisions)
+    # Fast DDS reads them all as plain CDR; by the standard the alignment is another.
+    bench.sender.publish(bytes([0, encapsulation]) + raw[2:])
+    soon(lambda: len(bench.decisions) > count, 'a decision')
+    assert bench.decisions[-1].reason_code == 'trajectory_unreadable'

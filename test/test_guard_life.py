@@ -248,6 +248,23 @@ def test_what_was_in_flight_is_rejected_when_deactivated(manager: Manager, ask: 
     assert ask.result('managed', FREE).verdict is Verdict.FREE
 
 
+def test_what_was_in_flight_is_rejected_when_configured_anew(manager: Manager, ask: Asker) -> None:
+    long = ask.client('managed').call_async(LONG)
+    time.sleep(0.3)
+    for transition in (
+        Transition.TRANSITION_DEACTIVATE,
+        Transition.TRANSITION_CLEANUP,
+        Transition.TRANSITION_CONFIGURE,
+        Transition.TRANSITION_ACTIVATE,
+    ):
+        assert manager.change(transition)
+    assert not long.done()
+    (response,) = gathered([long])
+    # It is about a robot and a scene that are not there any more.
+    assert rejection(result_from_message(response.result)) == Reason.NOT_READY
+    assert ask.result('managed', FREE).verdict is Verdict.FREE
+
+
 def test_a_thousand_at_once_are_all_answered(manager: Manager, ask: Asker) -> None:
     depth = QoSProfile(depth=1000)
     client = ask.node.create_client(CertifyTrajectory, '/managed/guard/certify', qos_profile=depth)

@@ -371,7 +371,7 @@ class Guard(ManagedNode):
             self._admission.sent()
 
     def _answer(self, request: CertifyTrajectory.Request) -> Result:
-        configuration = self._configuration
+        configuration, model = self._configuration, self._model
         try:
             with self._admission.entered(configuration.max_requests):
                 result = self._judged_by(self._workcell(configuration), request, configuration)
@@ -379,6 +379,8 @@ class Guard(ManagedNode):
             if refusal is not None:
                 # Deactivated meanwhile: an answer that comes now must not start a motion.
                 raise refusal
+            if self._model is not model:
+                raise RequestError(Reason.NOT_READY, 'the guard was configured anew meanwhile')
         except TrajectoryGuardError as error:
             return Result.rejected(error, configuration.settings)
         return result
