@@ -246,10 +246,14 @@ class Bench:
         assert self.code(trajectory) == 'proved_free', self.decisions[-1].message
 
     def rest(self, q: Sequence[float]) -> None:
-        """Put the robot there at once, at rest, and return when the gate should know."""
+        """
+        Put the robot there at once, at rest, and return when the gate should know.
+
+        What was passed on before has begun by then.
+        """
         self.q = dict(zip(JOINTS, q, strict=True))
         self.dq = dict.fromkeys(JOINTS, 0.0)
-        time.sleep(5 * PERIOD)
+        time.sleep(10 * PERIOD)
 
     def _tell(self) -> None:
         if not self.tells:

@@ -12,7 +12,7 @@ import threading
 import time
 from typing import Any
 
-from gate_process import Bench, fake_guard, FakeGuard, gate_process, soon
+from gate_process import Bench, fake_guard, FakeGuard, gate_process, PERIOD, soon
 from guard_process import Asker, asker, message, ros_context, spinning
 import pytest
 from rclpy.action.client import ActionClient
@@ -184,6 +184,12 @@ def bench(tmp_path_factory: Any, ask: Asker, guard: FakeGuard, jtc: Controller) 
 @pytest.fixture(scope='module')
 def goals(ask: Asker, bench: Bench) -> Goals:
     return Goals(ask)
+
+
+@pytest.fixture(autouse=True)
+def later() -> None:
+    """Let the gate hear of the robot after the controller began with the goal before."""
+    time.sleep(10 * PERIOD)
 
 
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6

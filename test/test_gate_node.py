@@ -203,8 +203,10 @@ def test_a_joint_that_the_robot_lacks(bench: Bench) -> None:
     time.sleep(5 * PERIOD)
     trajectory = message((0.0, [0.0, 0.0]), joints=['shoulder', 'knee'])
     assert bench.code(trajectory) == 'unknown_joint'
-    # The gate has seen that joint now, and waits for it.
+    # The gate has seen that joint now, and waits for it until its state is not fresh any more.
     assert bench.code(FREE) == 'proved_free'
+    bench.rest([0.0, 0.0])
+    time.sleep(PATIENT['max_state_age'])
 
 
 def test_bytes_that_are_no_message(bench: Bench) -> None:

@@ -191,6 +191,10 @@ def test_life(managed: GuardProcess, manager: Manager, ask: Asker, files: Path) 
     assert rejection(ask.result('managed', FREE)) == Reason.NOT_READY
     assert 'inactive' in manager.says(lambda said: not said.ready).message
     assert manager.set(**other) == ''
+    # It would answer by what was loaded, not by what its parameters say.
+    assert not manager.change(Transition.TRANSITION_ACTIVATE)
+    assert manager.state() == State.PRIMARY_STATE_INACTIVE
+    assert 'scene_pose' in managed.said()
     assert manager.change(Transition.TRANSITION_CLEANUP)
     assert rejection(ask.result('managed', FREE)) == Reason.NOT_READY
     assert manager.change(Transition.TRANSITION_CONFIGURE)
@@ -241,6 +245,23 @@ def test_what_was_in_flight_is_rejected_when_deactivated(manager: Manager, ask: 
     (response,) = gathered([long])
     assert rejection(result_from_message(response.result)) == Reason.NOT_READY
     assert manager.change(Transition.TRANSITION_ACTIVATE)
+    assert ask.result('managed', FREE).verdict is Verdict.FREE
+
+
+def test_what_was_in_flight_is_rejected_when_configured_anew(manager: Manager, ask: Asker) -> None:
+    long = ask.client('managed').call_async(LONG)
+    time.sleep(0.3)
+    for transition in (
+        Transition.TRANSITION_DEACTIVATE,
+        Transition.TRANSITION_CLEANUP,
+        Transition.TRANSITION_CONFIGURE,
+        Transition.TRANSITION_ACTIVATE,
+    ):
+        assert manager.change(transition)
+    assert not long.done()
+    (response,) = gathered([long])
+    # It is about a robot and a scene that are not there any more.
+    assert rejection(result_from_message(response.result)) == Reason.NOT_READY
     assert ask.result('managed', FREE).verdict is Verdict.FREE
 
 

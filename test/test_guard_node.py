@@ -325,6 +325,11 @@ BAD = {
         bad(lambda r: setattr(r.trajectory.header, 'stamp', Time(sec=1))),
         Reason.INVALID_PARAMETER,
     ),
+    # The controller's type of time raises at negative seconds.
+    'a stamp whose parts add up to 0': (
+        bad(lambda r: setattr(r.trajectory.header, 'stamp', Time(sec=-1, nanosec=10**9))),
+        Reason.INVALID_PARAMETER,
+    ),
     'negative tolerance': (request(FREE, tolerance=-1e-4), Reason.INVALID_TOLERANCE),
     'NaN tolerance': (request(FREE, tolerance=math.nan), Reason.INVALID_TOLERANCE),
     'negative clearance': (request(FREE, clearance=-0.1), Reason.INVALID_CLEARANCE),

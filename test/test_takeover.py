@@ -210,7 +210,9 @@ def test_an_approach_is_covered(degree: int, reads_velocity: bool, stamped: bool
         assert plan.entry is Entry.APPROACH
         path, tolerance = certified(message, plan)
         later_ns = int(rng.integers(0, allowance.max_wait_ns + allowance.max_start_delay_ns + 1))
-        state = moved(rng, measured, allowance.max_drift, allowance.max_velocity_drift)
+        # As far off as the check lets pass, and as much again until the controller begins.
+        faster = 2 * allowance.max_velocity_drift
+        state = moved(rng, measured, allowance.max_drift, faster)
         played = Played(message, NOW_NS + later_ns, state, reads_velocity)
         (begin_ns, _), (first_at_ns, _), *_ = played.knots
         T = int(path.knots_ns[1])
@@ -250,6 +252,17 @@ def test_each_term_of_the_bound_is_reached(v0: float) -> None:
     assert (largest >= 0.99 * tolerance).all()
 
 
+def test_a_velocity_that_changes_before_and_after_the_check_is_covered() -> None:
+    message = straight(5 * SECOND)
+    plan = plan_of(message, STILL)
+    drift = ALLOWANCE.max_velocity_drift
+    plan.check(NOW_NS, {name: Measured(0.0, 0.999 * drift, 0) for name in JOINTS})
+    path, tolerance = certified(message, plan)
+    played = Played(message, NOW_NS, dict.fromkeys(JOINTS, (0.0, 1.999 * drift)))
+    for t in range(0, 5 * SECOND, SECOND // 10):
+        assert (distance(played.at(NOW_NS + t), message, path, t) <= tolerance).all()
+
+
 @pytest.mark.parametrize('degree', [1, 3, 5])
 def test_what_begins_in_the_middle_is_covered(degree: int) -> None:
     rng = np.random.default_rng(degree)
@@ -281,6 +294,23 @@ def test_what_begins_in_the_middle_is_covered(degree: int) -> None:
                 robot = np.array([measured[name].position for name in path.joint_names])
                 assert (np.abs(robot - path.position(t)) <= tolerance + ROUNDING).all()
     assert begun > 50
+
+
+def test_a_joint_that_is_not_continuous_after_all_is_not_turned() -> None:
+    message = straight(0, NOW_NS - SECOND // 2)
+    allowance = dataclasses.replace(
+        ALLOWANCE, continuous_joints=frozenset({'turn', 'spin'}), max_start_delay_ns=SECOND // 1000
+    )
+    measured = {name: Measured(0.5, 0.0, 0) for name in JOINTS}
+    certified(message, plan_of(message, measured, allowance))
+    certified(
+        message, plan_of(message, measured | {'spin': Measured(0.5 - math.tau, 0.0, 0)}, allowance)
+    )
+    # The robot has 'turn' as a joint with limits, which would go back by a whole turn.
+    turned = measured | {'turn': Measured(0.5 - math.tau, 0.0, 0)}
+    with pytest.raises(TrajectoryError) as caught:
+        certified(message, plan_of(message, turned, allowance))
+    assert caught.value.reason is Reason.START_STATE_MISMATCH
 
 
 def test_what_begins_at_once_is_covered() -> None:

@@ -36,9 +36,12 @@ class Allowance:
     What may differ between the proof and the moment at which the controller begins.
 
     :param max_drift: how far a joint may be off the state that was certified [rad or m].
-    :param max_velocity_drift: how far its velocity may be off [rad/s or m/s].
-    :param max_start_delay_ns: from passing on to the controller's first sample, and how far its
-        clock may differ [ns].
+    :param max_velocity_drift: how far its velocity may be off when the trajectory is passed on,
+        and how much it may change from when it was measured last until the controller begins
+        [rad/s or m/s].
+    :param max_start_delay_ns: from passing on to the controller's first sample, and how far the
+        instant of that on the controller's clock may be off that of passing on, on the gate's,
+        either way: the delay and the difference of the clocks together [ns].
     :param max_wait_ns: from the measurement to passing on [ns].
     :param allowed_start_tolerance: how far a joint may be off the path where the controller does
         not approach it [rad or m].

@@ -49,6 +49,9 @@ class Takeover:
 
         |dq| + 4/27 ((T + |dT|) |dv| + |dT| (|v0| + |v1|)).
 
+    |dq| is at most ``max_drift``: `check` counts the way that is still to come. |dv| is at most
+    twice ``max_velocity_drift``: `check` lets pass one by which the last velocity that was
+    measured is off v0, and until the controller begins it may change by one more.
     dT is 0 without a stamp. With one, the approach ends at a given instant, so it is as much
     shorter as it begins later. A cubic approach needs velocities of both the state and point 0, a
     quintic one accelerations of both; a controller that reads accelerations is refused where they
@@ -314,7 +317,7 @@ def _approach_cover(
         (
             drift
             + _STEEPEST
-            * (longest_s * allowance.max_velocity_drift + later_s * (abs(v0) + abs(v1)))
+            * (longest_s * 2.0 * allowance.max_velocity_drift + later_s * (abs(v0) + abs(v1)))
         )
         * _UP
         for v0, v1 in zip(velocities, trajectory.velocities[0].tolist(), strict=True)

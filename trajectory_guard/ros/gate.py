@@ -40,6 +40,10 @@ TRAJECTORIES = QoSProfile(depth=100)
 # Takes reliable publishers and others. Several of them, each with some joints, share the queue.
 STATES = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 
+# How what is passed on may be encoded, big or little endian. Fast DDS reads other encodings as if
+# they were this one, and who aligns them by the standard reads another trajectory.
+PLAIN_CDR = (b'\0\0', b'\0\1')
+
 # How often it is looked whether an answer is late, and whether the gate is ready [s].
 CLOCK_PERIOD = 0.02
 STATUS_PERIOD = 0.2
@@ -108,6 +112,8 @@ class Gate(Node):
 
     def _take_trajectory(self, raw: bytes) -> None:
         try:
+            if bytes(raw[:2]) not in PLAIN_CDR:
+                raise ValueError(f'its encoding is {bytes(raw[:2]).hex()}, not plain CDR')
             message = deserialize_message(raw, JointTrajectory)
         except Exception as error:
             self._keeper.refuse(Reason.TRAJECTORY_UNREADABLE, f'no trajectory: {error!r}')

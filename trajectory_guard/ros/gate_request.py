@@ -67,11 +67,17 @@ def _start_state(plan: Takeover) -> JointState:
 
     Where the controller begins in the middle, the path's own joints are at its first point then.
     The state is never empty, so the guard takes none of its own that nobody has checked.
+
+    Whole turns that were taken off a joint are in the state: the guard, who knows the robot, does
+    not take them for nothing where the joint is not continuous.
     """
     positions = {name: joint.position for name, joint in plan.measured.items()}
     if plan.entry is Entry.MIDDLE:
         first = plan.trajectory.positions[0].tolist()
-        positions |= dict(zip(plan.trajectory.joint_names, first, strict=True))
+        for name, q0, turned in zip(
+            plan.trajectory.joint_names, first, plan.positions, strict=True
+        ):
+            positions[name] = q0 + (positions[name] - turned)
     return JointState(name=list(positions), position=list(positions.values()))
 
 

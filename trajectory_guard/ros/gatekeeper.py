@@ -11,8 +11,8 @@ from trajectory_msgs.msg import JointTrajectory
 
 from msg_adapters.result import nanoseconds_to_message
 from msg_adapters.trajectory import stamp_from_message, trajectory_from_message
-from trajectory_guard.errors import Reason, RequestError, TrajectoryGuardError
-from trajectory_guard.paths.takeover import takeover
+from trajectory_guard.errors import Reason, RequestError, TrajectoryError, TrajectoryGuardError
+from trajectory_guard.paths.takeover import Takeover, takeover
 from trajectory_guard.ros.declared import per_joint
 from trajectory_guard.ros.gate_configuration import GateConfiguration
 from trajectory_guard.ros.gate_guard import GuardClient, least_from_response
@@ -50,6 +50,8 @@ class Gatekeeper:
         self.configuration = configuration
         self._publish = publish
         self._trial: Trial | None = None
+        # When something was passed on last, on the steady clock.
+        self._passed_ns: int | None = None
         self._number = 0
 
     def consider(
@@ -128,6 +130,10 @@ class Gatekeeper:
     def _ask_least(self, trial: Trial) -> None:
         """Refuse what cannot be played, or asked; ask what the guard asks for at least."""
         trial.trajectory = trajectory_from_message(trial.message)
+        stamp = trial.message.header.stamp
+        if stamp.sec < 0:
+            # Whatever the sum with nanosec is, the controller's own type of time raises.
+            raise TrajectoryError(Reason.STAMP_INVALID, f'header.stamp is negative: {stamp.sec} s')
         self._check_surroundings(trial)
         trial.future = self._guard.least_tracking_tolerance()
         trial.future.add_done_callback(partial(self._step, trial, self._ask_certify, trial))
@@ -171,13 +177,33 @@ class Gatekeeper:
         changed = self._guard.changed_since(result)
         if changed is not None:
             raise changed
-        steady_ns, now_ns = self._now()
-        trial.plan.check(
-            now_ns, self._states.fresh(steady_ns, now_ns, trial.configuration.max_state_age_ns)
-        )
-        trial.forward()
+        self._check_state(trial, trial.plan)
+        try:
+            trial.forward()
+        finally:
+            self._passed_ns = time.monotonic_ns()
         self._trial = None
         self._decide(trial, GateDecision.PASSED, Reason.PROVED_FREE, '')
+
+    def _check_state(self, trial: Trial, plan: Takeover) -> None:
+        """
+        Check that the proof holds for where the robot is now.
+
+        Only a state counts that was measured when the controller had begun with what was passed on
+        last: an older one tells of a robot that was still to be set in motion.
+        """
+        steady_ns, now_ns = self._now()
+        fresh = self._states.fresh(steady_ns, now_ns, trial.configuration.max_state_age_ns)
+        if self._passed_ns is not None:
+            begun_ns = self._passed_ns + trial.configuration.allowance.max_start_delay_ns
+            for name in plan.measured.keys() & fresh.keys():
+                if fresh[name].age_ns > steady_ns - begun_ns:
+                    raise TrajectoryError(
+                        Reason.STATE_CHANGED,
+                        f'the controller may not have begun with the trajectory before when joint '
+                        f'{name!r} was measured, {fresh[name].age_ns / 1e9:.3f} s ago',
+                    )
+        plan.check(now_ns, fresh)
 
     # Decisions
 

@@ -73,6 +73,7 @@ class Guard(ManagedNode):
         self._admission = Admission()
         self._active = False
         self._model: Model | None = None
+        self._loaded: dict[str, Any] = {}
         self._joint_states: JointStates | None = None
         self._service: Service | None = None
         self._failure: TrajectoryGuardError = RequestError(
@@ -150,6 +151,7 @@ class Guard(ManagedNode):
 
     def _configure(self) -> None:
         configuration = self._configuration
+        self._loaded = _at_configure(self._values)
         self._model = Model(self, configuration, self._say_state)
         self.get_logger().info('warming up (the first start compiles the kernels)')
         warm_up(configuration.settings.cover)
@@ -178,7 +180,18 @@ class Guard(ManagedNode):
             self._introspect()
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Answer from now on."""
+        """Answer from now on, unless other files or topics are wanted than are in use."""
+        wanted = _at_configure(self._values)
+        changed = [name for name, value in self._loaded.items() if value != wanted[name]]
+        if changed:
+            self._failure = RequestError(
+                Reason.NOT_READY,
+                f'{", ".join(changed)} changed since the guard was configured: clean it up, and '
+                'configure it again',
+            )
+            if not self._quiet:
+                self.get_logger().error(f'cannot be activated: {self._failure}')
+            return TransitionCallbackReturn.FAILURE
         self._active = True
         self._say_state()
         return TransitionCallbackReturn.SUCCESS
@@ -359,7 +372,7 @@ class Guard(ManagedNode):
             self._admission.sent()
 
     def _answer(self, request: CertifyTrajectory.Request) -> Result:
-        configuration = self._configuration
+        configuration, model = self._configuration, self._model
         try:
             with self._admission.entered(configuration.max_requests):
                 result = self._judged_by(self._workcell(configuration), request, configuration)
@@ -367,6 +380,8 @@ class Guard(ManagedNode):
             if refusal is not None:
                 # Deactivated meanwhile: an answer that comes now must not start a motion.
                 raise refusal
+            if self._model is not model:
+                raise RequestError(Reason.NOT_READY, 'the guard was configured anew meanwhile')
         except TrajectoryGuardError as error:
             return Result.rejected(error, configuration.settings)
         return result
@@ -400,3 +415,8 @@ class Guard(ManagedNode):
         if self._judged is not None:
             result, workcell, question = self._judged
             self._moments.publish(result, workcell, question.trajectory, question.start)
+
+
+def _at_configure(values: dict[str, Any]) -> dict[str, Any]:
+    """Return the values that say what is loaded."""
+    return {name: value for name, value in values.items() if DECLARATIONS[name].at_configure}

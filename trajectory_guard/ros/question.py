@@ -50,13 +50,15 @@ def question_from_request(request: Any, configuration: Configuration) -> Questio
     """
     _check_sizes(request, configuration)
     message = request.trajectory
-    if nanoseconds_from_message(message.header.stamp) != 0:
+    stamp = message.header.stamp
+    # Not their sum: parts of unlike signs may add up to 0, which no controller takes for it.
+    if stamp.sec or stamp.nanosec:
         # A stamp moves the points, but not the moment at which the controller begins: the way to
         # the first point would take longer, or the motion begin in the middle.
         raise RequestError(
             Reason.INVALID_PARAMETER,
             'header.stamp of the trajectory must be 0 (start when it arrives), '
-            f'got {message.header.stamp.sec} s {message.header.stamp.nanosec} ns',
+            f'got {stamp.sec} s {stamp.nanosec} ns',
         )
     trajectory = trajectory_from_message(message)
     if trajectory.times_ns[-1] > LAST_INSTANT_NS:
