@@ -468,6 +468,16 @@ def test_live_scene_and_two_of_one_name(ask: Asker, files: Path) -> None:
         publish(cube(5.0))
         eventually(lambda: ask.result('live', FREE), lambda r: r.verdict is Verdict.FREE)
 
+        # One that gets too old meanwhile.
+        assert manager.set(max_scene_age=0.5) == ''
+        publish(cube(5.0))
+        eventually(lambda: ask.result('live', FREE), lambda r: r.verdict is Verdict.FREE)
+        long = ask.client('live').call_async(LONG)
+        manager.says(lambda said: said.reason_code == Reason.SCENE_STALE)
+        assert not long.done()
+        (response,) = gathered([long])
+        assert rejection(result_from_message(response.result)) == Reason.SCENE_STALE
+
         # The scene stops.
         assert manager.set(max_scene_age=0.3) == ''
         eventually(lambda: ask.result('live', FREE), lambda r: r.reason_code == Reason.SCENE_STALE)

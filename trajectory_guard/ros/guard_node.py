@@ -376,10 +376,9 @@ class Guard(ManagedNode):
         try:
             with self._admission.entered(configuration.max_requests):
                 result = self._judged_by(self._workcell(configuration), request, configuration)
-                refusal = self._refusal()
-            if refusal is not None:
-                # Deactivated meanwhile: an answer that comes now must not start a motion.
-                raise refusal
+            # Deactivated meanwhile, or without a scene: an answer that comes now must not start a
+            # motion.
+            self._workcell(configuration)
             if self._model is not model:
                 raise RequestError(Reason.NOT_READY, 'the guard was configured anew meanwhile')
         except TrajectoryGuardError as error:
