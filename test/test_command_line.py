@@ -4,6 +4,7 @@ import io
 import json
 import os
 from pathlib import Path
+import resource
 import subprocess
 import sys
 from typing import Any
@@ -381,13 +382,30 @@ def test_a_file_is_not_enough_for_several_certificates(cell: Cell) -> None:
     assert not target.exists()
 
 
-@pytest.mark.parametrize('target', ['missing/proof.json', 'plan.yaml/', '/dev/full'])
+@pytest.mark.parametrize('target', ['missing/proof.json', 'plan.yaml/', 'pipe'])
 def test_a_certificate_that_cannot_be_written_is_bad_input(cell: Cell, target: str) -> None:
+    os.mkfifo(cell.folder / 'pipe')
     run = cell.check(FREE, '--certificate', f'{cell.folder}/{target}')
     assert run.exit_code == 2
     assert 'error: --certificate: cannot write' in run.stderr
     assert run.stderr.count('\n') == 1
     assert not list(cell.folder.glob('.*'))
+    assert (cell.folder / 'pipe').is_fifo()
+
+
+@pytest.mark.parametrize('target', ['proof.json', 'proofs/'])
+def test_a_disk_that_is_full_leaves_no_half_certificate(cell: Cell, target: str) -> None:
+    plan = cell.file('plan.yaml', FREE)
+    least, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    # As on a full disk, writing begins well and then fails.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, most))
+    try:
+        run = cell.run(plan, '--certificate', f'{cell.folder}/{target}')
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (least, most))
+    assert run.exit_code == 2
+    assert 'error: --certificate: cannot write' in run.stderr
+    assert not [*cell.folder.rglob('*.json'), *cell.folder.rglob('.*')]
 
 
 def test_contacts_are_named(cell: Cell) -> None:

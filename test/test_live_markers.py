@@ -1,21 +1,30 @@
 """An obstacle that a viewer may show is there, or the state says that something is missing."""
 
+from collections import Counter
 import copy
 
+from guard_process import ARM
 from marker_messages import array, BASE, delete, delete_all, marker
 import numpy as np
 import pytest
 from visualization_msgs.msg import Marker, MarkerArray
 
 from msg_adapters.marker import added_keys, changes_from_message
+from trajectory_guard.cell.urdf import robot_from_urdf
+from trajectory_guard.cell.workcell import Workcell
+from trajectory_guard.certify import judge
 from trajectory_guard.errors import Reason, TrajectoryGuardError
 from trajectory_guard.markers.live_markers import LiveMarkers
 from trajectory_guard.markers.marker import Key
-from trajectory_guard.markers.marker_scene import MarkerLimits
+from trajectory_guard.markers.marker_scene import MarkerLimits, with_markers
+from trajectory_guard.paths.trajectory import Point, Trajectory
+from trajectory_guard.result import Verdict
 
 FRAMES = {BASE: ()}
 LIMITS = MarkerLimits(markers=6, points=20)
 BAD = marker(scale=(0, 0, 0))
+# The arm sweeps over it.
+WITNESS = marker(number=9, ns='witness', scale=(0.1, 0.1, 0.1), position=(0.7, 0.2, 0.0))
 
 
 def after(state: LiveMarkers, *messages: Marker, limits: MarkerLimits = LIMITS) -> LiveMarkers:
@@ -153,6 +162,69 @@ def test_no_mutated_marker_is_lost() -> None:
             shown = {key: True for key in state.scene.entries if key.name in names(state)}
             shown |= {key: True for key in state.missing if isinstance(key, Key)}
     assert 1000 < refused < 3500
+
+
+def with_witness(rng: np.random.Generator) -> list[Marker]:
+    """Return the markers of an array, some of them about the cube that the arm cannot miss."""
+    messages = [mutated(rng, int(rng.integers(3))) for _ in range(int(rng.integers(4)))]
+    if rng.random() < 0.2:
+        messages.insert(0, delete_all())
+    match rng.integers(20):
+        case 0 | 1 | 2 | 3:
+            messages.append(copy.deepcopy(WITNESS))
+        case 4:
+            messages.append(delete(WITNESS.id, WITNESS.ns))
+        case 5:
+            messages.append(delete_all(WITNESS.ns))
+        case 6:
+            bad = mutated(rng, WITNESS.id)
+            bad.ns = WITNESS.ns
+            messages.append(bad)
+    return messages
+
+
+def witness_after(there: bool | None, messages: list[Marker]) -> bool | None:
+    """Return whether the cube is there after an array that was taken; None: who knows."""
+    for message in messages:
+        if message.action == Marker.DELETEALL and message.ns in ('', WITNESS.ns):
+            there = False
+        elif (message.ns, message.id) == (WITNESS.ns, WITNESS.id):
+            there = {Marker.DELETE: False}.get(message.action)
+            if message == WITNESS:
+                there = True
+    return there
+
+
+@pytest.mark.parametrize('count', [2000, pytest.param(100_000, marks=pytest.mark.slow)])
+def test_nothing_is_free_through_a_cube_that_is_shown(count: int) -> None:
+    """Whatever else comes: a cube in the way is an obstacle, or the guard is not ready."""
+    robot = robot_from_urdf(ARM)
+    points = [Point(0, (0.0, 0.0)), Point(10**9, (0.5, 0.0))]
+    swing = Trajectory.from_points(('shoulder', 'elbow'), points)
+    limits = MarkerLimits(points=1000)
+    rng = np.random.default_rng(5)
+    state, there = LiveMarkers(), False
+    seen: Counter[tuple[bool | None, Verdict | None]] = Counter()
+    for k in range(count):
+        messages = with_witness(rng)
+        before, state = state, after(state, *messages, limits=limits)
+        if state.scene is before.scene:
+            # What would only have removed something leaves it.
+            adding = any(m.action not in (Marker.DELETE, Marker.DELETEALL) for m in messages)
+            assert state.error is not None or not adding
+        else:
+            there = witness_after(there, messages)
+        verdict = None
+        if state.error is None and k % 20 == 0 and state.scene.obstacles(FRAMES):
+            verdict = judge(
+                Workcell(robot, with_markers(None, state.scene, FRAMES)), swing
+            ).verdict
+            assert verdict in (Verdict.FREE, Verdict.SUSPECT, Verdict.COLLISION)
+            assert not (there and verdict is Verdict.FREE)
+        seen[there, verdict] += 1
+    assert seen[True, Verdict.COLLISION] > count // 1000
+    assert seen[False, Verdict.FREE] > count // 1000
+    assert sum(seen[there, None] for there in (True, False, None)) > count // 10
 
 
 def test_what_is_no_array_is_an_error_not_an_obstacle() -> None:

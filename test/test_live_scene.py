@@ -1,6 +1,7 @@
 """Markers over real DDS: what is published becomes obstacles, and moments are seen."""
 
 from collections.abc import Callable, Iterator
+import threading
 import time
 from types import SimpleNamespace
 
@@ -81,6 +82,28 @@ def test_no_array_falls_out_of_a_queue(node: Node) -> None:
         publisher.publish(array(marker(number=k)))
     until(lambda: len(seen) == 50)
     assert seen == [*range(1, 51)]
+
+
+def test_an_array_that_waited_is_as_old_as_it_is(node: Node) -> None:
+    """The age counts from when it came, not from when there was time for it."""
+    going = threading.Event()
+    seen: list[int] = []
+
+    def slowly() -> None:
+        seen.append(live.received_ns or 0)
+        going.wait(PATIENCE)
+
+    live = LiveScene(node, 'waiting', slowly)
+    publisher = node.create_publisher(MarkerArray, 'waiting', MARKERS)
+    until(lambda: publisher.get_subscription_count() == 1)
+    publisher.publish(array(marker(number=1)))
+    until(lambda: len(seen) == 1)
+    publisher.publish(array(marker(number=2)))
+    time.sleep(0.5)
+    taken_ns = time.monotonic_ns()
+    going.set()
+    until(lambda: len(seen) == 2)
+    assert seen[0] < seen[1] < taken_ns
 
 
 def test_a_lost_array_is_an_error_until_a_new_beginning(node: Node) -> None:

@@ -119,3 +119,17 @@ def test_an_unusable_mesh_is_named(tmp_path: Path, name: str, content: bytes, na
 def test_a_folder_is_no_mesh(tmp_path: Path) -> None:
     (tmp_path / 'hand.stl').mkdir()
     assert load_error('hand.stl', tmp_path).reason is Reason.MESH_MISSING
+
+
+def test_a_file_that_changes_is_read_again(tmp_path: Path) -> None:
+    path = tmp_path / 'mesh.obj'
+    loaded = []
+    for size in (1, 2, 1):
+        path.write_text(f'v 0 0 0\nv {size} 0 0\nv 0 1 0\nf 1 2 3\n')
+        loaded.append(MeshFile(str(path)).load())
+    small, large, again = loaded
+    assert small.content != large.content
+    assert small.body.vertices.max() == 1.0 and large.body.vertices.max() == 2.0
+    assert again.body is small.body and again.content == small.content
+    # The same file at another scale is another body.
+    assert MeshFile(str(path), scale=(3.0, 1.0, 1.0)).load().body.vertices.max() == 3.0

@@ -31,6 +31,9 @@ class Certificates:
                 target.mkdir(parents=True, exist_ok=True)
             elif not target.absolute().parent.is_dir():
                 raise FileNotFoundError(f'no folder {str(target.absolute().parent)!r}')
+            elif target.exists() and not target.is_file():
+                # A file would take the place of a device, as of /dev/null.
+                raise OSError('it is no regular file')
         except OSError as error:
             raise _unusable(target, error) from error
 

@@ -279,11 +279,16 @@ class Guard(ManagedNode):
         status, model = self._status_publisher.said, self._model
         workcell = model.value if model is not None else None
         if status.ready and isinstance(workcell, Workcell):
-            self.get_logger().info(
+            words = (
                 f'ready: robot {workcell.robot.name!r} ({workcell.robot_hash[:12]}), '
                 f'{len(workcell.robot.collision_links)} links; scene '
                 f'({workcell.scene_hash[:12]}), {len(workcell.scene.obstacles)} obstacles'
             )
+            if before.ready and before.robot_hash == status.robot_hash:
+                # A live scene may change many times a second.
+                self.get_logger().debug(words)
+            else:
+                self.get_logger().info(words)
         elif self._active or before.ready:
             # That it is inactive at the start is nothing to be warned of.
             self.get_logger().warning(f'not ready: {status.message}')

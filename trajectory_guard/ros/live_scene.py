@@ -16,7 +16,7 @@ The node then reads `state`, a value, and builds its scene anew::
 Before the first array `received_ns` is None: whether to wait for one is up to the node.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 import time
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -78,7 +78,7 @@ class LiveScene:
         self._subscription = node.create_subscription(
             MarkerArray,
             topic,
-            self._take,
+            self._take,  # type: ignore[arg-type] # the stubs know of one argument only
             MARKERS,
             callback_group=MutuallyExclusiveCallbackGroup(),
             event_callbacks=SubscriptionEventCallbacks(
@@ -93,7 +93,7 @@ class LiveScene:
 
     @property
     def received_ns(self) -> int | None:
-        """When the last array came, on the steady clock ``time.monotonic_ns`` [ns]."""
+        """When the last array that was taken came, on ``time.monotonic_ns`` [ns]."""
         return self._received_ns
 
     @property
@@ -105,9 +105,12 @@ class LiveScene:
         """Stop listening."""
         self._node.destroy_subscription(self._subscription)
 
-    def _take(self, message: MarkerArray) -> None:
+    def _take(self, message: MarkerArray, info: Mapping[str, int]) -> None:
+        # It may have waited long behind others: markers that lag are old.
+        waited_ns = time.time_ns() - (info['received_timestamp'] or time.time_ns())
+        received_ns = time.monotonic_ns() - max(waited_ns, 0)
         self._state = self._after(message)
-        self._received_ns = time.monotonic_ns()
+        self._received_ns = received_ns
         self._on_change()
 
     def _after(self, message: MarkerArray) -> LiveMarkers:

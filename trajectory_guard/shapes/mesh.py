@@ -1,6 +1,7 @@
 """Mesh files as convex bodies."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 import hashlib
 from pathlib import Path
 
@@ -16,6 +17,10 @@ from trajectory_guard.shapes.unique_rows import unique_rows
 # A hull that exceeds its mesh by no more than this fraction of the size is the mesh: single
 # precision in a file makes a convex surface that uneven.
 TIGHT = 2.0**-20
+
+# A live scene tells the same meshes again wherever they move: the bodies of so many files up to
+# that size are kept [bytes].
+KEPT, SMALL = 64, 2**20
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,14 +47,14 @@ class MeshFile:
             MESH_FORBIDDEN, TOO_LARGE.
         """
         path = self._find()
-        reader = READERS.get(path.suffix.lower())
-        if reader is None:
+        if path.suffix.lower() not in READERS:
             raise RobotError(
                 Reason.MESH_INVALID, f'mesh {self.uri!r} is not one of {", ".join(READERS)}'
             )
         try:
             content = self.limits.read(path)
-            body = mesh_body(reader(content), self.scale)
+            make = _kept_body if len(content) <= SMALL else _body
+            body = make(path.suffix.lower(), content, self.scale)
         except (OSError, ValueError) as error:
             raise RobotError(
                 Reason.MESH_INVALID, f'mesh {self.uri!r} ({path}): {error}'
@@ -63,6 +68,14 @@ class MeshFile:
                 return path
         where = ', '.join(map(str, looked)) or 'nowhere: the URI names no place on this machine'
         raise RobotError(Reason.MESH_MISSING, f'mesh {self.uri!r} not found; looked at {where}')
+
+
+def _body(suffix: str, content: bytes, scale: tuple[float, float, float]) -> ConvexBody:
+    """Return the body of what a file contains."""
+    return mesh_body(READERS[suffix](content), scale)
+
+
+_kept_body = lru_cache(KEPT)(_body)
 
 
 def mesh_body(mesh: Triangles, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> ConvexBody:
