@@ -3,10 +3,11 @@
 from collections.abc import Iterator
 from pathlib import Path
 import signal
+import time
 from typing import NamedTuple
 
 from builtin_interfaces.msg import Time
-from gate_process import Bench, fake_guard, gate_process, soon
+from gate_process import Bench, fake_guard, gate_process, PERIOD, soon
 from guard_process import (
     ARM,
     Asker,
@@ -111,6 +112,8 @@ class World(NamedTuple):
         """Return as soon as both know where the robot is; what is free passes then."""
         soon(lambda: self.bench.code(FREE) == 'proved_free', 'a gate that knows the robot')
         soon(lambda: self.asked().verdict is Verdict.FREE, 'a guard that knows the robot')
+        # What was passed on has begun by then.
+        time.sleep(10 * PERIOD)
 
     def closed(self) -> None:
         """Return as soon as neither knows where the robot is; nothing passes then."""
