@@ -167,7 +167,8 @@ class _Child:
         if code == BAD_INPUT and self._runs == 1:
             raise RequestError(
                 Reason.INVALID_PARAMETER,
-                f'{who} cannot use an argument, a parameter or a file; its last lines say which',
+                f'{who} cannot use an argument, a parameter or a file; its last lines say which '
+                f'(a parameter of the {name} alone is -p {name}:NAME:=VALUE)',
             )
         ran = time.monotonic() - self._since
         if ran >= STEADY:
