@@ -1,6 +1,7 @@
 """The guard among other nodes: its life, what it hears, and whatever goes wrong around it."""
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 import signal
 import time
@@ -493,7 +494,10 @@ def test_live_scene_and_two_of_one_name(ask: Asker, files: Path) -> None:
             if '[FATAL]' not in second.said():
                 second.process.send_signal(signal.SIGTERM)
             assert second.process.wait(PATIENCE) in (2, 0)
-        eventually(lambda: ask.result('live', FREE), lambda r: r.verdict is Verdict.FREE)
+        for _ in range(2):  # longer than the middleware counts one that ended in a hurry
+            with suppress(AssertionError):
+                eventually(lambda: ask.result('live', FREE), lambda r: r.verdict is Verdict.FREE)
+        assert ask.result('live', FREE).verdict is Verdict.FREE
 
         # One that is there all the same stops the first, as long as it lives.
         with guard_process(files, 'live', *arguments, *parameters(autostart='false')) as second:
